@@ -1,0 +1,223 @@
+// Structs, bindings and tags shared with the host: the twin of src/layout.rs.
+// Order, names and types must match; tests/layout.rs compares every offset.
+// Lengths in metres; positions are relative to Params.origin_* of the host.
+
+#ifndef LAYOUT_GLSL
+#define LAYOUT_GLSL
+
+#extension GL_EXT_scalar_block_layout : require
+
+const uint NONE = 0xFFFFFFFFu;
+
+// --- Params: one per render ------------------------------------------------
+
+const uint CAMERA_PERSPECTIVE = 0u;
+const uint CAMERA_ORTHOGRAPHIC = 1u;
+
+struct Params {
+    vec3 camera_position;    // perspective: pinhole; orthographic: centre of the image plane
+    uint camera_kind;        // CAMERA_*
+    vec3 camera_right;       // image x axis, scaled to half the image's width (at distance 1 when perspective)
+    uint width;              // full frame, pixels
+    vec3 camera_up;          // image y axis, scaled to half the height
+    uint height;             // full frame, pixels
+    vec3 camera_forward;     // unit
+    uint window_x;           // first column rendered
+    uint window_y;           // first row rendered
+    uint window_width;       // columns rendered
+    uint window_height;      // rows rendered
+    uint tiles_x;            // tiles of 8 × 8 pixels across the window
+    uint tiles_y;
+    uint seed_low;
+    uint seed_high;
+    uint max_depth;          // NONE: unlimited
+    uint light_count;        // entries of the light table
+    float area_light_norm;   // weight × area summed over emissive triangles (NaN-free; 0: none)
+    float area_light_choice; // probability that the light table returns an emissive triangle
+    vec3 env_radiance;       // factor on the map, or the constant radiance
+    uint env_width;          // 0: constant
+    uint env_height;
+    float env_choice;        // probability that direct light samples the map
+    float env_cos_rotation;
+    float env_sin_rotation;
+    float scene_radius;      // radius of the bounding sphere
+    uint bvh_root;           // first node of the top level (of the only level without instances)
+};
+
+// --- Push constants: one per batch -----------------------------------------
+
+struct Batch {
+    uint first_sample_low;   // global sample index
+    uint first_sample_high;
+    uint sample_count;       // a power of two that divides the first sample's index
+    uint first_tile;         // in interleaved order
+    uint tile_count;
+    uint interleave;         // tiles are dealt out to this many workers
+};
+
+// --- Geometry ----------------------------------------------------------------
+
+// A group is a list of triangles with one acceleration structure: all meshes that
+// are placed once (already in world space), or one mesh that is placed often.
+struct Instance {
+    vec3 world_from_object_x; // columns of the 4 × 3 matrix
+    vec3 world_from_object_y;
+    vec3 world_from_object_z;
+    vec3 world_from_object_t;
+    vec3 object_from_world_x;
+    vec3 object_from_world_y;
+    vec3 object_from_world_z;
+    vec3 object_from_world_t;
+    uint first_triangle;      // of the group, in `triangles`
+    uint bvh_root;            // own BVH: first node of the group
+    uint bvh_first_triangle;  // own BVH: first record of the group in `bvh_triangles`
+    uint is_identity;         // 1: the group is in world space
+};
+
+// `triangles` holds (vertex, vertex, vertex, material | TRIANGLE_* flags).
+const uint TRIANGLE_MATERIAL_MASK = 0x00FFFFFFu;
+const uint TRIANGLE_HAS_NORMALS = 0x80000000u;
+const uint TRIANGLE_HAS_TANGENTS = 0x40000000u;
+const uint TRIANGLE_HAS_COLORS = 0x20000000u;
+// With HAS_ALPHA: this triangle may be cut out (alpha-tested during traversal).
+const uint TRIANGLE_IS_MASKED = 0x10000000u;
+
+// `vertices` holds two texels each: (position, u), (normal, v).
+// `attributes`, when present, three texels for each vertex: tangent, colour, (u1, v1, 0, 0).
+
+// --- Materials ---------------------------------------------------------------
+
+const uint MATERIAL_DOUBLE_SIDED = 1u;
+const uint MATERIAL_MASK = 2u;
+const uint MATERIAL_BLEND = 4u;
+const uint MATERIAL_HAS_TEXTURES = 8u;
+
+struct Material {
+    vec3 base_color;
+    uint flags;                 // MATERIAL_*
+    vec3 emission;              // radiance, cd/m²
+    float emission_weight;      // light choice: density of choosing per area; 0 where nothing is emitted
+    float alpha;
+    float alpha_cutoff;
+    float metallic;
+    float roughness;            // perceptual
+    vec3 specular_f0;           // ((ior − 1)/(ior + 1))² × specular colour, before clamping
+    float specular;             // strength: scales F0 and is F90
+    float normal_scale;
+    uint first_texture;         // of TEXTURE_SLOTS entries in `texture_uses`; only with MATERIAL_HAS_TEXTURES
+};
+
+// Slots of a textured material, in order.
+const uint TEXTURE_BASE_COLOR = 0u;
+const uint TEXTURE_METALLIC_ROUGHNESS = 1u;
+const uint TEXTURE_NORMAL = 2u;
+const uint TEXTURE_EMISSION = 3u;
+const uint TEXTURE_SPECULAR = 4u;
+const uint TEXTURE_SPECULAR_COLOR = 5u;
+const uint TEXTURE_SLOTS = 6u;
+
+// A texture applied to a slot. `first_texel` is NONE where the slot is empty.
+struct TextureUse {
+    uint first_texel;           // in `texels`
+    uint width;
+    uint height;
+    uint format;                // FORMAT_* | WRAP_* << 4 (u) | WRAP_* << 8 (v) | filter << 12
+    uint uv_set;
+    vec3 uv_row_u;              // u' = row · (u, v, 1)
+    vec3 uv_row_v;
+};
+
+const uint FORMAT_RGBA8 = 0u;
+const uint FORMAT_SRGB8 = 1u;
+const uint FORMAT_RGBA16 = 2u;
+const uint WRAP_REPEAT = 0u;
+const uint WRAP_MIRROR = 1u;
+const uint WRAP_CLAMP = 2u;
+const uint FILTER_NEAREST = 0u;
+const uint FILTER_LINEAR = 1u;
+// `texels` starts with the 256 decoded sRGB values as float bits.
+const uint SRGB_TABLE = 256u;
+
+// --- Lights ------------------------------------------------------------------
+
+const uint LIGHT_TRIANGLE = 0u;
+const uint LIGHT_POINT = 1u;
+const uint LIGHT_SPOT = 2u;
+const uint LIGHT_DIRECTIONAL = 3u;
+
+// One entry of the alias table over all lights but the environment.
+struct Light {
+    uint kind;                  // LIGHT_*
+    uint instance;              // triangle: where it is …
+    uint triangle;              // … and its index in `triangles`
+    uint alias;                 // entry to take instead …
+    float keep;                 // … with probability 1 − keep
+    float choice;               // probability of this light, given that a light of the table is chosen
+    vec3 position;              // point, spot: metres
+    vec3 direction;             // spot, directional: where it shines to, unit
+    vec3 intensity;             // cd, or lx when directional
+    float cos_inner;            // spot
+    float cos_outer;
+};
+
+// Environment map texel: alias table over all texels.
+struct EnvTexel {
+    float keep;
+    uint alias;
+    float pdf;                  // per steradian
+};
+
+// --- Probe: rays in, hits out (tests, identity layers) -------------------------
+
+struct ProbeRay {
+    vec3 origin;
+    float t_min;
+    vec3 direction;
+    float t_max;
+};
+
+struct ProbeHit {
+    float t;                    // metres; < 0 on a miss
+    vec2 bary;                  // weights of the second and third vertex
+    uint instance;
+    uint primitive;             // within the group
+    uint occluded;              // what trace_occluded says of the same ray
+};
+
+// --- Film ------------------------------------------------------------------------
+
+// Per pixel of the window, FILM_FLOATS (with HAS_AOVS FILM_FLOATS_AOV) floats: sum of radiance and sum of squared
+// deviations from the mean over the batch's samples, then sums of albedo, normal, depth and coverage of the first hit.
+const uint FILM_FLOATS = 6u;
+const uint FILM_FLOATS_AOV = 14u;
+// Counters of the ledger.
+const uint LEDGER_NON_FINITE = 0u;
+const uint LEDGER_TRUNCATED = 1u;
+const uint LEDGER_RAYS_LOW = 2u;
+const uint LEDGER_RAYS_HIGH = 3u;
+const uint LEDGER_SIZE = 4u;
+
+const uint TILE = 8u;
+
+// --- Bindings: one descriptor set ---------------------------------------------------
+
+const uint BIND_PARAMS = 0u;         // uniform buffer: Params
+const uint BIND_FILM = 1u;           // storage: float[]
+const uint BIND_LEDGER = 2u;         // storage: uint[LEDGER_SIZE]
+const uint BIND_INSTANCES = 3u;      // storage: Instance[]
+const uint BIND_TRIANGLES = 4u;      // texel buffer RGBA32UI
+const uint BIND_VERTICES = 5u;       // texel buffer RGBA32F
+const uint BIND_ATTRIBUTES = 6u;     // texel buffer RGBA32F
+const uint BIND_MATERIALS = 7u;      // storage: Material[]
+const uint BIND_TEXTURE_USES = 8u;   // storage: TextureUse[]
+const uint BIND_TEXELS = 9u;         // texel buffer R32UI
+const uint BIND_LIGHTS = 10u;        // storage: Light[]
+const uint BIND_ENV_MAP = 11u;       // texel buffer RGBA32F
+const uint BIND_ENV_TABLE = 12u;     // storage: EnvTexel[]
+const uint BIND_SCENE = 13u;         // acceleration structure (ray query)
+const uint BIND_BVH_NODES = 14u;     // texel buffer RGBA32UI, five texels a node (own BVH)
+const uint BIND_BVH_TRIANGLES = 15u; // texel buffer RGBA32F, three texels a triangle (own BVH)
+const uint BIND_PROBE_RAYS = 16u;    // storage: ProbeRay[] (probe kernel)
+const uint BIND_PROBE_HITS = 17u;    // storage: ProbeHit[] (probe kernel)
+
+#endif

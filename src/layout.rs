@@ -1,0 +1,209 @@
+//! Structs, bindings and tags shared with the shaders: the twin of
+//! `shaders/layout.glsl`, in the same order with the same names. Scalar block
+//! layout gives GLSL the offsets of `repr(C)` (`vec3` is twelve bytes).
+//! `tests/layout.rs` compares every offset, size and constant. Meanings and
+//! units stand in the GLSL file.
+#![allow(
+    missing_docs,
+    reason = "each field is documented once, in shaders/layout.glsl"
+)]
+
+/// One struct of the shared layout: its fields' names and offsets, and its size in bytes.
+pub struct StructLayout {
+    pub name: &'static str,
+    pub fields: &'static [(&'static str, usize)],
+    pub size: usize,
+}
+
+macro_rules! shared {
+    ($($name:ident { $($field:ident: $ty:ty,)* })*) => {
+        $(
+            #[repr(C)]
+            #[derive(Clone, Copy, Debug, Default, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
+            pub struct $name { $(pub $field: $ty,)* }
+        )*
+        /// Every shared struct, for the comparison with the shaders.
+        pub const STRUCTS: &[StructLayout] = &[$(StructLayout {
+            name: stringify!($name),
+            fields: &[$((stringify!($field), std::mem::offset_of!($name, $field)),)*],
+            size: size_of::<$name>(),
+        },)*];
+    };
+}
+
+macro_rules! tags {
+    ($($name:ident = $value:expr;)*) => {
+        $(pub const $name: u32 = $value;)*
+        /// Every shared constant, for the comparison with the shaders.
+        pub const CONSTANTS: &[(&str, u32)] = &[$((stringify!($name), $name),)*];
+    };
+}
+
+shared! {
+    Params {
+        camera_position: [f32; 3],
+        camera_kind: u32,
+        camera_right: [f32; 3],
+        width: u32,
+        camera_up: [f32; 3],
+        height: u32,
+        camera_forward: [f32; 3],
+        window_x: u32,
+        window_y: u32,
+        window_width: u32,
+        window_height: u32,
+        tiles_x: u32,
+        tiles_y: u32,
+        seed_low: u32,
+        seed_high: u32,
+        max_depth: u32,
+        light_count: u32,
+        area_light_norm: f32,
+        area_light_choice: f32,
+        env_radiance: [f32; 3],
+        env_width: u32,
+        env_height: u32,
+        env_choice: f32,
+        env_cos_rotation: f32,
+        env_sin_rotation: f32,
+        scene_radius: f32,
+        bvh_root: u32,
+    }
+    Batch {
+        first_sample_low: u32,
+        first_sample_high: u32,
+        sample_count: u32,
+        first_tile: u32,
+        tile_count: u32,
+        interleave: u32,
+    }
+    Instance {
+        world_from_object_x: [f32; 3],
+        world_from_object_y: [f32; 3],
+        world_from_object_z: [f32; 3],
+        world_from_object_t: [f32; 3],
+        object_from_world_x: [f32; 3],
+        object_from_world_y: [f32; 3],
+        object_from_world_z: [f32; 3],
+        object_from_world_t: [f32; 3],
+        first_triangle: u32,
+        bvh_root: u32,
+        bvh_first_triangle: u32,
+        is_identity: u32,
+    }
+    Material {
+        base_color: [f32; 3],
+        flags: u32,
+        emission: [f32; 3],
+        emission_weight: f32,
+        alpha: f32,
+        alpha_cutoff: f32,
+        metallic: f32,
+        roughness: f32,
+        specular_f0: [f32; 3],
+        specular: f32,
+        normal_scale: f32,
+        first_texture: u32,
+    }
+    TextureUse {
+        first_texel: u32,
+        width: u32,
+        height: u32,
+        format: u32,
+        uv_set: u32,
+        uv_row_u: [f32; 3],
+        uv_row_v: [f32; 3],
+    }
+    Light {
+        kind: u32,
+        instance: u32,
+        triangle: u32,
+        alias: u32,
+        keep: f32,
+        choice: f32,
+        position: [f32; 3],
+        direction: [f32; 3],
+        intensity: [f32; 3],
+        cos_inner: f32,
+        cos_outer: f32,
+    }
+    EnvTexel {
+        keep: f32,
+        alias: u32,
+        pdf: f32,
+    }
+    ProbeRay {
+        origin: [f32; 3],
+        t_min: f32,
+        direction: [f32; 3],
+        t_max: f32,
+    }
+    ProbeHit {
+        t: f32,
+        bary: [f32; 2],
+        instance: u32,
+        primitive: u32,
+        occluded: u32,
+    }
+}
+
+tags! {
+    NONE = 0xFFFFFFFF;
+    CAMERA_PERSPECTIVE = 0;
+    CAMERA_ORTHOGRAPHIC = 1;
+    TRIANGLE_MATERIAL_MASK = 0x00FFFFFF;
+    TRIANGLE_HAS_NORMALS = 0x80000000;
+    TRIANGLE_HAS_TANGENTS = 0x40000000;
+    TRIANGLE_HAS_COLORS = 0x20000000;
+    TRIANGLE_IS_MASKED = 0x10000000;
+    MATERIAL_DOUBLE_SIDED = 1;
+    MATERIAL_MASK = 2;
+    MATERIAL_BLEND = 4;
+    MATERIAL_HAS_TEXTURES = 8;
+    TEXTURE_BASE_COLOR = 0;
+    TEXTURE_METALLIC_ROUGHNESS = 1;
+    TEXTURE_NORMAL = 2;
+    TEXTURE_EMISSION = 3;
+    TEXTURE_SPECULAR = 4;
+    TEXTURE_SPECULAR_COLOR = 5;
+    TEXTURE_SLOTS = 6;
+    FORMAT_RGBA8 = 0;
+    FORMAT_SRGB8 = 1;
+    FORMAT_RGBA16 = 2;
+    WRAP_REPEAT = 0;
+    WRAP_MIRROR = 1;
+    WRAP_CLAMP = 2;
+    FILTER_NEAREST = 0;
+    FILTER_LINEAR = 1;
+    SRGB_TABLE = 256;
+    LIGHT_TRIANGLE = 0;
+    LIGHT_POINT = 1;
+    LIGHT_SPOT = 2;
+    LIGHT_DIRECTIONAL = 3;
+    FILM_FLOATS = 6;
+    FILM_FLOATS_AOV = 14;
+    LEDGER_NON_FINITE = 0;
+    LEDGER_TRUNCATED = 1;
+    LEDGER_RAYS_LOW = 2;
+    LEDGER_RAYS_HIGH = 3;
+    LEDGER_SIZE = 4;
+    TILE = 8;
+    BIND_PARAMS = 0;
+    BIND_FILM = 1;
+    BIND_LEDGER = 2;
+    BIND_INSTANCES = 3;
+    BIND_TRIANGLES = 4;
+    BIND_VERTICES = 5;
+    BIND_ATTRIBUTES = 6;
+    BIND_MATERIALS = 7;
+    BIND_TEXTURE_USES = 8;
+    BIND_TEXELS = 9;
+    BIND_LIGHTS = 10;
+    BIND_ENV_MAP = 11;
+    BIND_ENV_TABLE = 12;
+    BIND_SCENE = 13;
+    BIND_BVH_NODES = 14;
+    BIND_BVH_TRIANGLES = 15;
+    BIND_PROBE_RAYS = 16;
+    BIND_PROBE_HITS = 17;
+}

@@ -1,0 +1,15 @@
+//! etendue: a physically based path tracer on Vulkan. glTF in, radiometrically
+//! right OpenEXR out.
+
+pub mod bvh;
+pub mod error;
+pub mod film;
+pub mod gpu;
+pub mod image_io;
+pub mod layout;
+pub mod render;
+pub mod scene;
+pub mod settings;
+pub mod spec;
+
+pub use error::{Error, Result};

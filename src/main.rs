@@ -1,0 +1,3 @@
+//! The `etendue` program.
+
+fn main() {}

@@ -1,0 +1,91 @@
+//! Light and matter, free of files and of Vulkan: flat lists that refer to each
+//! other by index. Every index in a [`Scene`] that the loader returns is valid.
+//!
+//! World space is right-handed, +Y up, in metres. Transforms are kept in double
+//! precision so that a scene far from the origin loses nothing before it is
+//! moved back to it (see `render::upload`).
+
+mod camera;
+mod environment;
+pub mod gltf;
+mod light;
+mod material;
+mod mesh;
+mod texture;
+
+use glam::{DAffine3, DVec3};
+
+pub use camera::{Camera, Projection};
+pub use environment::Environment;
+pub use light::{LightKind, PunctualLight};
+pub use material::{AlphaMode, Material};
+pub use mesh::Mesh;
+pub use texture::{Filter, Texels, Texture, TextureRef, Wrap};
+
+/// A mesh placed in the world.
+#[derive(Clone, Debug)]
+pub struct Instance {
+    /// Name of the glTF node, or `node N`.
+    pub name: String,
+    /// Index into [`Scene::meshes`].
+    pub mesh: u32,
+    /// Object to world; invertible.
+    pub world_from_object: DAffine3,
+}
+
+/// Everything that is needed to compute light transport.
+#[derive(Clone, Debug, Default)]
+pub struct Scene {
+    /// One entry for each glTF primitive.
+    pub meshes: Vec<Mesh>,
+    /// Placed meshes; several may share one mesh.
+    pub instances: Vec<Instance>,
+    /// Surface descriptions; never empty when there are meshes.
+    pub materials: Vec<Material>,
+    /// Decoded images with their sampler.
+    pub textures: Vec<Texture>,
+    /// Point, spot and directional lights in world space.
+    pub lights: Vec<PunctualLight>,
+    /// Cameras in world space, in the order of the file's nodes.
+    pub cameras: Vec<Camera>,
+    /// Radiance that arrives from infinity; none is black.
+    pub environment: Option<Environment>,
+    /// What the loader had to leave out or change, for the user to read.
+    pub warnings: Vec<String>,
+    /// SHA-256 of the scene file and everything that it refers to, hexadecimal.
+    pub hash: String,
+}
+
+impl Scene {
+    /// Number of triangles, instances counted.
+    pub fn triangle_count(&self) -> u64 {
+        self.instances
+            .iter()
+            .map(|i| self.meshes[i.mesh as usize].triangles.len() as u64)
+            .sum()
+    }
+
+    /// World-space bounding box of all instances, metres; `None` when empty.
+    pub fn bounds(&self) -> Option<(DVec3, DVec3)> {
+        let mut bounds: Option<(DVec3, DVec3)> = None;
+        for instance in &self.instances {
+            let Some((low, high)) = self.meshes[instance.mesh as usize].bounds() else {
+                continue;
+            };
+            for corner in 0..8 {
+                let pick = |axis: usize| {
+                    if corner >> axis & 1 == 0 {
+                        low[axis]
+                    } else {
+                        high[axis]
+                    }
+                };
+                let corner = DVec3::new(pick(0).into(), pick(1).into(), pick(2).into());
+                let p = instance.world_from_object.transform_point3(corner);
+                let (lo, hi) = bounds.unwrap_or((p, p));
+                bounds = Some((lo.min(p), hi.max(p)));
+            }
+        }
+        bounds
+    }
+}

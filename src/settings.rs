@@ -1,0 +1,164 @@
+//! What to render and how: everything that decides the bits of the picture
+//! besides the scene itself.
+
+use std::ops::Range;
+
+use crate::error::{Error, Result};
+
+/// Which traversal answers "what does this ray meet?".
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum BackendChoice {
+    /// By device: see [`crate::render::choose_backend`].
+    #[default]
+    Auto,
+    /// VK_KHR_ray_query in a compute shader.
+    RayQuery,
+    /// Our own bounding volume hierarchy in a compute shader.
+    Bvh,
+}
+
+impl BackendChoice {
+    /// The name on the command line and in files.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Auto => "auto",
+            Self::RayQuery => "ray-query",
+            Self::Bvh => "bvh",
+        }
+    }
+}
+
+/// The whole estimator or the yardstick it is measured against.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Estimator {
+    /// Everything that lowers the error for the time.
+    #[default]
+    Full,
+    /// BSDF sampling, next event estimation with uniform light choice, independent random numbers.
+    Textbook,
+}
+
+impl Estimator {
+    /// The name on the command line and in files.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Full => "full",
+            Self::Textbook => "textbook",
+        }
+    }
+}
+
+/// How direct light is found. All three have the same expected value; tests compare them.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Strategy {
+    /// Light and BSDF sampling, combined by the power heuristic.
+    #[default]
+    Mis,
+    /// Light sampling alone wherever it is possible.
+    LightOnly,
+    /// BSDF sampling alone wherever it is possible.
+    BsdfOnly,
+}
+
+/// A rectangle of pixels of the full frame; half open.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Crop {
+    /// First column.
+    pub x0: u32,
+    /// First row.
+    pub y0: u32,
+    /// Column after the last.
+    pub x1: u32,
+    /// Row after the last.
+    pub y1: u32,
+}
+
+/// Everything a render depends on besides the scene.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Settings {
+    /// Full frame width, pixels.
+    pub width: u32,
+    /// Full frame height, pixels.
+    pub height: u32,
+    /// Part of the frame to render; `None` is all of it.
+    pub crop: Option<Crop>,
+    /// Global sample indices to render, half open.
+    pub samples: Range<u64>,
+    /// Seed of the random numbers.
+    pub seed: u64,
+    /// Scattering events at most; 0 is unlimited.
+    pub max_depth: u32,
+    /// Traversal.
+    pub backend: BackendChoice,
+    /// Estimator.
+    pub estimator: Estimator,
+    /// How direct light is found.
+    pub strategy: Strategy,
+    /// Which camera of the scene; `None` is the first, or one that frames the scene.
+    pub camera: Option<usize>,
+    /// Also average albedo, normal, depth and coverage of the first hit.
+    pub aovs: bool,
+}
+
+impl Default for Settings {
+    fn default() -> Self {
+        Self {
+            width: 1280,
+            height: 720,
+            crop: None,
+            samples: 0..128,
+            seed: 0,
+            max_depth: 0,
+            backend: BackendChoice::Auto,
+            estimator: Estimator::Full,
+            strategy: Strategy::Mis,
+            camera: None,
+            aovs: false,
+        }
+    }
+}
+
+/// Largest width or height of a frame: what OpenEXR viewers and 32-bit pixel indices take.
+pub const MAX_SIDE: u32 = 65_536;
+
+impl Settings {
+    /// The pixels to render: the crop, or the whole frame.
+    pub fn window(&self) -> Crop {
+        self.crop.unwrap_or(Crop {
+            x0: 0,
+            y0: 0,
+            x1: self.width,
+            y1: self.height,
+        })
+    }
+
+    /// Refuses what cannot be rendered, naming the option.
+    pub fn validate(&self) -> Result<()> {
+        let fail = |name, what: String| Err(Error::Settings { name, what });
+        for (name, side) in [("--width", self.width), ("--height", self.height)] {
+            if side == 0 || side > MAX_SIDE {
+                return fail(name, format!("{side} is not in 1 … {MAX_SIDE}"));
+            }
+        }
+        let Crop { x0, y0, x1, y1 } = self.window();
+        if x0 >= x1 || y0 >= y1 || x1 > self.width || y1 > self.height {
+            return fail(
+                "--crop",
+                format!(
+                    "{x0},{y0},{x1},{y1} is empty or leaves the frame of {} × {} pixels",
+                    self.width, self.height
+                ),
+            );
+        }
+        if self.samples.is_empty() {
+            return fail(
+                "--samples",
+                format!(
+                    "{}..{} holds no sample",
+                    self.samples.start, self.samples.end
+                ),
+            );
+        }
+        Ok(())
+    }
+}
