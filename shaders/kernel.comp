@@ -1,2 +1,13 @@
+// Entry of every compute kernel. A macro chooses the traversal (traverse.glsl)
+// and the kernel, and nothing else.
 #version 460
-void main() {}
+#extension GL_GOOGLE_include_directive : require
+#ifdef TRAVERSE_QUERY
+#extension GL_EXT_ray_query : require
+#endif
+
+#ifdef KERNEL_PROBE
+#include "kernel_probe.glsl"
+#else
+#include "kernel_path.glsl"
+#endif

@@ -32,15 +32,14 @@ struct Params {
     uint seed_high;
     uint max_depth;          // NONE: unlimited
     uint light_count;        // entries of the light table
-    float area_light_norm;   // weight × area summed over emissive triangles (NaN-free; 0: none)
-    float area_light_choice; // probability that the light table returns an emissive triangle
+    float light_uniform;     // > 0: every entry of the table is chosen with this probability (textbook)
+    float table_choice;      // probability that direct light samples the table; 1 − env_choice, or 0 without lights
     vec3 env_radiance;       // factor on the map, or the constant radiance
     uint env_width;          // 0: constant
     uint env_height;
     float env_choice;        // probability that direct light samples the map
     float env_cos_rotation;
     float env_sin_rotation;
-    float scene_radius;      // radius of the bounding sphere
     uint bvh_root;           // first node of the top level (of the only level without instances)
 };
 
@@ -50,9 +49,10 @@ struct Batch {
     uint first_sample_low;   // global sample index
     uint first_sample_high;
     uint sample_count;       // a power of two that divides the first sample's index
-    uint first_tile;         // in interleaved order
+    uint first_tile;         // tiles run row by row through the window
     uint tile_count;
     uint interleave;         // tiles are dealt out to this many workers
+    uint film_first_pixel;   // the film buffer starts at this pixel of the window
 };
 
 // --- Geometry ----------------------------------------------------------------
@@ -72,6 +72,7 @@ struct Instance {
     uint bvh_root;            // own BVH: first node of the group
     uint bvh_first_triangle;  // own BVH: first record of the group in `bvh_triangles`
     uint is_identity;         // 1: the group is in world space
+    uint is_mirrored;         // 1: the determinant is negative
 };
 
 // `triangles` holds (vertex, vertex, vertex, material | TRIANGLE_* flags).
@@ -91,12 +92,13 @@ const uint MATERIAL_DOUBLE_SIDED = 1u;
 const uint MATERIAL_MASK = 2u;
 const uint MATERIAL_BLEND = 4u;
 const uint MATERIAL_HAS_TEXTURES = 8u;
+const uint MATERIAL_UNLIT = 16u;
 
 struct Material {
     vec3 base_color;
     uint flags;                 // MATERIAL_*
     vec3 emission;              // radiance, cd/m²
-    float emission_weight;      // light choice: density of choosing per area; 0 where nothing is emitted
+    float emission_pdf;         // probability density of a point on it among all points of the light table, 1/m²; 0: emits nothing
     float alpha;
     float alpha_cutoff;
     float metallic;

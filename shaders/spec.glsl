@@ -5,15 +5,17 @@
 #define SPEC_GLSL
 
 layout(constant_id = 0) const bool HAS_TEXTURES = true;
-layout(constant_id = 1) const bool HAS_ALPHA = true;       // cut-outs or blending
-layout(constant_id = 2) const bool HAS_SPECULAR = true;    // any material that is not pure Lambert
-layout(constant_id = 3) const bool HAS_NORMALS = true;     // shading normals
-layout(constant_id = 4) const bool HAS_ENVIRONMENT = true; // a map, not a constant
-layout(constant_id = 5) const bool HAS_AREA_LIGHTS = true; // emissive triangles
-layout(constant_id = 6) const bool HAS_PUNCTUAL = true;    // point, spot, directional
-layout(constant_id = 7) const bool HAS_INSTANCES = true;   // groups that are not in world space
-layout(constant_id = 8) const bool HAS_AOVS = true;
-layout(constant_id = 9) const uint STRATEGY = 0u;          // STRATEGY_*
+layout(constant_id = 1) const bool HAS_ALPHA = true;       // cut-outs
+layout(constant_id = 2) const bool HAS_BLEND = true;       // partial coverage
+layout(constant_id = 3) const bool HAS_SPECULAR = true;    // any material that is not pure Lambert
+layout(constant_id = 4) const bool HAS_NORMALS = true;     // shading normals
+layout(constant_id = 5) const bool HAS_ATTRIBUTES = true;  // tangents, vertex colours or a second set of coordinates
+layout(constant_id = 6) const bool HAS_ENVIRONMENT = true; // a map, not a constant
+layout(constant_id = 7) const bool HAS_AREA_LIGHTS = true; // emissive triangles
+layout(constant_id = 8) const bool HAS_PUNCTUAL = true;    // point, spot, directional
+layout(constant_id = 9) const bool HAS_INSTANCES = true;   // groups that are not in world space
+layout(constant_id = 10) const bool HAS_AOVS = true;
+layout(constant_id = 11) const uint STRATEGY = 0u;         // STRATEGY_*
 
 const uint STRATEGY_MIS = 0u;
 const uint STRATEGY_LIGHT_ONLY = 1u;

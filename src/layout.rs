@@ -58,15 +58,14 @@ shared! {
         seed_high: u32,
         max_depth: u32,
         light_count: u32,
-        area_light_norm: f32,
-        area_light_choice: f32,
+        light_uniform: f32,
+        table_choice: f32,
         env_radiance: [f32; 3],
         env_width: u32,
         env_height: u32,
         env_choice: f32,
         env_cos_rotation: f32,
         env_sin_rotation: f32,
-        scene_radius: f32,
         bvh_root: u32,
     }
     Batch {
@@ -76,6 +75,7 @@ shared! {
         first_tile: u32,
         tile_count: u32,
         interleave: u32,
+        film_first_pixel: u32,
     }
     Instance {
         world_from_object_x: [f32; 3],
@@ -90,12 +90,13 @@ shared! {
         bvh_root: u32,
         bvh_first_triangle: u32,
         is_identity: u32,
+        is_mirrored: u32,
     }
     Material {
         base_color: [f32; 3],
         flags: u32,
         emission: [f32; 3],
-        emission_weight: f32,
+        emission_pdf: f32,
         alpha: f32,
         alpha_cutoff: f32,
         metallic: f32,
@@ -160,6 +161,7 @@ tags! {
     MATERIAL_MASK = 2;
     MATERIAL_BLEND = 4;
     MATERIAL_HAS_TEXTURES = 8;
+    MATERIAL_UNLIT = 16;
     TEXTURE_BASE_COLOR = 0;
     TEXTURE_METALLIC_ROUGHNESS = 1;
     TEXTURE_NORMAL = 2;

@@ -1,1 +1,160 @@
-//! Placeholder.
+//! Which parts of the model a scene needs, frozen into the kernels as
+//! specialisation constants: the twin of `shaders/spec.glsl`. What is off leaves
+//! no instruction behind.
+
+use crate::scene::{AlphaMode, Material, Scene};
+use crate::settings::{Settings, Strategy};
+
+/// The features in the order of their constants' ids.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Spec {
+    /// Any texture.
+    pub textures: bool,
+    /// Alpha-tested cut-outs.
+    pub alpha: bool,
+    /// Partial coverage.
+    pub blend: bool,
+    /// Any surface that is not pure Lambert.
+    pub specular: bool,
+    /// Shading normals, interpolated or mapped.
+    pub normals: bool,
+    /// Tangents, vertex colours or a second set of coordinates.
+    pub attributes: bool,
+    /// An environment map; a constant needs nothing.
+    pub environment: bool,
+    /// Emissive triangles.
+    pub area_lights: bool,
+    /// Point, spot and directional lights.
+    pub punctual: bool,
+    /// Meshes that are kept once and placed often.
+    pub instances: bool,
+    /// Layers of the first hit.
+    pub aovs: bool,
+    /// How direct light is found.
+    pub strategy: Strategy,
+}
+
+impl Spec {
+    /// What the scene needs, before geometry is uploaded. `normals`,
+    /// `attributes` and `instances` are settled by the upload, which sees the meshes.
+    pub fn for_scene(scene: &Scene, settings: &Settings) -> Self {
+        let mut spec = Self {
+            aovs: settings.aovs,
+            strategy: settings.strategy,
+            punctual: scene.lights.iter().any(|l| l.intensity.max_element() > 0.0),
+            environment: matches!(
+                &scene.environment,
+                Some(crate::scene::Environment::Map { .. })
+            ),
+            ..Self::default()
+        };
+        let mut used: Vec<u32> = scene
+            .instances
+            .iter()
+            .map(|i| scene.meshes[i.mesh as usize].material)
+            .collect();
+        used.sort_unstable();
+        used.dedup();
+        for material in used.iter().map(|&m| &scene.materials[m as usize]) {
+            spec.textures |= has_textures(material);
+            spec.alpha |= matches!(material.alpha_mode, AlphaMode::Mask { .. });
+            spec.blend |= material.alpha_mode == AlphaMode::Blend;
+            spec.specular |= is_specular(material);
+            spec.area_lights |= is_emissive(material);
+        }
+        spec
+    }
+
+    /// Everything switched on: must give the same picture.
+    pub fn with_everything(self) -> Self {
+        Self {
+            textures: true,
+            alpha: true,
+            blend: true,
+            specular: true,
+            normals: true,
+            attributes: true,
+            environment: self.environment,
+            area_lights: true,
+            punctual: true,
+            instances: self.instances,
+            aovs: self.aovs,
+            strategy: self.strategy,
+        }
+    }
+
+    /// Names of the features with their state, for people and files.
+    pub fn features(&self) -> [(&'static str, bool); 11] {
+        [
+            ("textures", self.textures),
+            ("alpha", self.alpha),
+            ("blend", self.blend),
+            ("specular", self.specular),
+            ("normals", self.normals),
+            ("attributes", self.attributes),
+            ("environment", self.environment),
+            ("area-lights", self.area_lights),
+            ("punctual", self.punctual),
+            ("instances", self.instances),
+            ("aovs", self.aovs),
+        ]
+    }
+
+    /// Pairs of constant id and value.
+    pub fn constants(&self) -> Vec<(u32, u32)> {
+        let strategy = match self.strategy {
+            Strategy::Mis => 0,
+            Strategy::LightOnly => 1,
+            Strategy::BsdfOnly => 2,
+        };
+        let flags = self.features().map(|(_, on)| u32::from(on));
+        (0..).zip(flags.into_iter().chain([strategy])).collect()
+    }
+}
+
+/// Whether any slot of the material holds a texture.
+pub(crate) fn has_textures(m: &Material) -> bool {
+    [
+        m.base_color_texture,
+        m.metallic_roughness_texture,
+        m.normal_texture,
+        m.emission_texture,
+        m.specular_texture,
+        m.specular_color_texture,
+    ]
+    .iter()
+    .any(Option::is_some)
+}
+
+/// Whether light that the material emits can be other than zero.
+pub(crate) fn is_emissive(m: &Material) -> bool {
+    if m.unlit {
+        m.base_color.truncate().max_element() > 0.0
+    } else {
+        m.emission.max_element() > 0.0
+    }
+}
+
+/// Whether the material reflects other than as pure Lambert.
+fn is_specular(m: &Material) -> bool {
+    !m.unlit && (m.metallic > 0.0 || m.specular > 0.0)
+}
+
+macro_rules! spirv {
+    ($name:literal) => {
+        include_bytes!(concat!(env!("OUT_DIR"), "/", $name, ".spv"))
+    };
+}
+
+/// SPIR-V of the kernels, one for each traversal.
+pub(crate) mod kernels {
+    pub(crate) const PATH_SOFTWARE: &[u8] = spirv!("path_software");
+    pub(crate) const PATH_QUERY: &[u8] = spirv!("path_query");
+    pub(crate) const PROBE_SOFTWARE: &[u8] = spirv!("probe_software");
+    pub(crate) const PROBE_QUERY: &[u8] = spirv!("probe_query");
+}
+
+/// SPIR-V bytes as words.
+pub(crate) fn words(bytes: &[u8]) -> Vec<u32> {
+    bytemuck::pod_collect_to_vec(bytes)
+}

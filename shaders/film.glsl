@@ -1,0 +1,65 @@
+// Sums of samples as a dyadic tree over global sample indices, so that any split
+// of the samples into ranges gives the same bits. The host continues the tree
+// above the batch (src/film.rs) with the same operations in the same order.
+//
+// [Chan79] Chan, Golub, LeVeque, Updating Formulae for Computing Sample Variances.
+
+#ifndef FILM_GLSL
+#define FILM_GLSL
+
+#include "scene.glsl"
+
+layout(binding = BIND_FILM, scalar) buffer FilmBlock { float film[]; };
+layout(binding = BIND_LEDGER, scalar) buffer LedgerBlock { uint ledger[]; };
+
+// Levels of the tree that one batch can hold: up to 2^(FILM_LEVELS − 1) samples.
+const uint FILM_LEVELS = 9u;
+
+struct FilmNode {
+    vec3 sum;        // of radiance
+    vec3 m2;         // squared deviations from the node's mean
+    vec3 albedo;     // sums over the first hits
+    vec3 normal;
+    float depth;
+    float coverage;
+};
+
+// Two siblings of `count` samples each, the earlier one first.
+FilmNode film_merge(FilmNode a, FilmNode b, float count)
+{
+    FilmNode r;
+    precise vec3 sum = a.sum + b.sum;
+    precise vec3 d = a.sum - b.sum;
+    precise vec3 m2 = (a.m2 + b.m2) + (d * d) * (1.0 / (2.0 * count));
+    r.sum = sum;
+    r.m2 = m2;
+    if (HAS_AOVS) {
+        precise vec3 albedo = a.albedo + b.albedo;
+        precise vec3 normal = a.normal + b.normal;
+        precise float depth = a.depth + b.depth;
+        r.albedo = albedo;
+        r.normal = normal;
+        r.depth = depth;
+        r.coverage = a.coverage + b.coverage;
+    }
+    return r;
+}
+
+void film_write(uint pixel, FilmNode node)
+{
+    uint at = pixel * (HAS_AOVS ? FILM_FLOATS_AOV : FILM_FLOATS);
+    for (uint c = 0u; c < 3u; c++) {
+        film[at + c] = node.sum[c];
+        film[at + 3u + c] = node.m2[c];
+        if (HAS_AOVS) {
+            film[at + 6u + c] = node.albedo[c];
+            film[at + 9u + c] = node.normal[c];
+        }
+    }
+    if (HAS_AOVS) {
+        film[at + 12u] = node.depth;
+        film[at + 13u] = node.coverage;
+    }
+}
+
+#endif

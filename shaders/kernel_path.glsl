@@ -1,0 +1,77 @@
+// Renders a batch: some tiles of the window, an aligned power of two of samples.
+// One invocation computes all samples of its pixel, in order.
+
+#include "film.glsl"
+#include "path.glsl"
+
+layout(local_size_x = 64, local_size_y = 1, local_size_z = 1) in;
+
+layout(push_constant, scalar) uniform BatchBlock { Batch batch; };
+
+// Place in the 8 × 8 tile: eight neighbours in the index are a block of 4 × 2 pixels, so that a subgroup stays together.
+uvec2 kernel_place(uint i)
+{
+    return uvec2((i & 3u) | (i >> 1u & 4u), (i >> 2u & 1u) | (i >> 3u & 6u));
+}
+
+// Tile of work group i, or NONE. Tiles are dealt out like cards to
+// `interleave` workers, since lavapipe gives each thread one contiguous run of
+// work groups and neighbouring tiles cost alike.
+uint kernel_tile(uint i)
+{
+    uint rows = (batch.tile_count + batch.interleave - 1u) / batch.interleave;
+    uint k = (i % rows) * batch.interleave + i / rows;
+    return k < batch.tile_count ? batch.first_tile + k : NONE;
+}
+
+void main()
+{
+    uint tile = kernel_tile(gl_WorkGroupID.x);
+    if (tile == NONE) {
+        return;
+    }
+    uvec2 at = TILE * uvec2(tile % params.tiles_x, tile / params.tiles_x) + kernel_place(gl_LocalInvocationID.x);
+    if (at.x >= params.window_width || at.y >= params.window_height) {
+        return;
+    }
+    uvec2 pixel = uvec2(params.window_x, params.window_y) + at;
+    uint pixel_index = pixel.y * params.width + pixel.x;
+    uvec2 seed = uvec2(params.seed_low, params.seed_high);
+
+    FilmNode levels[FILM_LEVELS];
+    uint rays = 0u;
+    uint truncated = 0u;
+    uint non_finite = 0u;
+    uint level = 0u;
+    for (uint i = 0u; i < batch.sample_count; i++) {
+        // Batches are aligned, so the low word does not overflow within one.
+        uvec4 key = rng_key(seed, pixel_index, batch.first_sample_low + i, batch.first_sample_high);
+        PathResult path = path_trace(key, pixel);
+        rays += path.rays;
+        truncated += path.is_truncated ? 1u : 0u;
+        bool is_dropped = !is_finite(path.radiance);
+        non_finite += is_dropped ? 1u : 0u;
+
+        FilmNode node = FilmNode(is_dropped ? vec3(0.0) : path.radiance, vec3(0.0), path.first.albedo, path.first.normal,
+                                 path.first.depth, path.first.coverage);
+        // A binary counter: each set bit of i is a finished sibling.
+        float count = 1.0;
+        for (level = 0u; (i >> level & 1u) != 0u; level++) {
+            node = film_merge(levels[level], node, count);
+            count *= 2.0;
+        }
+        levels[level] = node;
+    }
+    film_write(at.y * params.window_width + at.x - batch.film_first_pixel, levels[level]);
+
+    if (truncated != 0u) {
+        atomicAdd(ledger[LEDGER_TRUNCATED], truncated);
+    }
+    if (non_finite != 0u) {
+        atomicAdd(ledger[LEDGER_NON_FINITE], non_finite);
+    }
+    uint before = atomicAdd(ledger[LEDGER_RAYS_LOW], rays);
+    if (before > 0xFFFFFFFFu - rays) {
+        atomicAdd(ledger[LEDGER_RAYS_HIGH], 1u);
+    }
+}

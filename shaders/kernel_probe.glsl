@@ -1,0 +1,27 @@
+// Traces given rays and returns what they meet: tests, and layers of identities.
+
+#include "surface.glsl"
+
+layout(local_size_x = 64, local_size_y = 1, local_size_z = 1) in;
+
+layout(binding = BIND_PROBE_RAYS, scalar) readonly buffer ProbeRaysBlock { ProbeRay probe_rays[]; };
+layout(binding = BIND_PROBE_HITS, scalar) writeonly buffer ProbeHitsBlock { ProbeHit probe_hits[]; };
+
+layout(push_constant, scalar) uniform BatchBlock { Batch batch; };
+
+void main()
+{
+    uint i = gl_GlobalInvocationID.x;
+    if (i >= batch.sample_count) {
+        return;
+    }
+    ProbeRay ray = probe_rays[i];
+    Hit hit;
+    bool is_hit = trace_closest(ray.origin, ray.direction, ray.t_min, ray.t_max, hit);
+    bool is_occluded = trace_occluded(ray.origin, ray.direction, ray.t_min, ray.t_max);
+    ProbeHit result = ProbeHit(-1.0, vec2(0.0), NONE, NONE, is_occluded ? 1u : 0u);
+    if (is_hit) {
+        result = ProbeHit(hit.t, hit.bary, hit.instance, hit.primitive, is_occluded ? 1u : 0u);
+    }
+    probe_hits[i] = result;
+}

@@ -1,0 +1,128 @@
+// Direct light: choose an emitter, sample a point or direction on it, and the
+// density of the same for directions that the BSDF chose. Emissive triangles and
+// punctual lights share one alias table; the environment map is chosen beside it.
+//
+// [Veach97] Veach, Robust Monte Carlo Methods for Light Transport Simulation, §8.
+
+#ifndef LIGHTS_GLSL
+#define LIGHTS_GLSL
+
+#include "environment.glsl"
+#include "surface.glsl"
+
+// A way for light to reach a point.
+struct LightSample {
+    vec3 target;     // where the light is; unused when it is infinitely far
+    vec3 wi;         // unit direction to it
+    bool is_infinite;
+    bool is_delta;   // no BSDF sample can find it
+    vec3 radiance;   // delta lights: irradiance on a surface that faces wi
+    float pdf;       // per steradian, choice included; delta lights: probability of the choice; 0: no light
+};
+
+// Density per steradian at which direct light would have sampled a point of an
+// emissive triangle that the BSDF found, `distance2` away.
+float light_triangle_pdf(SurfacePoint s, vec3 wo, float distance2)
+{
+    float pdf_area = params.light_uniform > 0.0 ? params.light_uniform / s.area : s.emission_pdf;
+    float cosine = abs(dot(s.ng, wo));
+    return cosine > 0.0 ? params.table_choice * pdf_area * distance2 / cosine : 0.0;
+}
+
+LightSample light_sample_triangle(Light light, vec3 from, vec2 u)
+{
+    LightSample s;
+    s.pdf = 0.0;
+    s.is_infinite = false;
+    s.is_delta = false;
+    uvec4 triangle = texelFetch(triangles, int(light.triangle));
+    TriangleShape shape = surface_shape(light.instance, triangle);
+    Material material = materials[triangle.w & TRIANGLE_MATERIAL_MASK];
+    vec2 bary = sample_triangle(u);
+    vec3 point = shape.v0 + bary.x * shape.e1 + bary.y * shape.e2;
+    vec3 to = point - from;
+    float distance2 = dot(to, to);
+    vec3 cross_edges = cross(shape.e1, shape.e2);
+    vec3 front = normalize(shape.is_mirrored ? -cross_edges : cross_edges);
+    s.wi = to * inversesqrt(distance2);
+    float cosine = -dot(front, s.wi);
+    bool is_lit = cosine > 0.0 || (cosine < 0.0 && (material.flags & MATERIAL_DOUBLE_SIDED) != 0u);
+    if (!is_lit || !(distance2 > 0.0)) {
+        return s;
+    }
+    s.radiance = surface_emission(material, triangle, bary);
+    if (HAS_BLEND && (material.flags & MATERIAL_BLEND) != 0u) {
+        s.radiance *= clamp(surface_base_color(material, triangle, bary).a, 0.0, 1.0);
+    }
+    if (HAS_ALPHA && (triangle.w & TRIANGLE_IS_MASKED) != 0u
+        && surface_base_color(material, triangle, bary).a < material.alpha_cutoff) {
+        return s;
+    }
+    // The ray stops short of the emitter by the bound on the error of its points.
+    s.target = offset_origin(point, shape.error, cosine > 0.0 ? front : -front);
+    float area = 0.5 * length(cross_edges);
+    float density = params.light_uniform > 0.0 ? params.light_uniform / area : material.emission_pdf;
+    s.pdf = params.table_choice * density * distance2 / abs(cosine);
+    return s;
+}
+
+LightSample light_sample_punctual(Light light, vec3 from)
+{
+    LightSample s;
+    s.is_delta = true;
+    s.is_infinite = light.kind == LIGHT_DIRECTIONAL;
+    s.target = light.position;
+    s.pdf = params.table_choice * light.choice;
+    if (s.is_infinite) {
+        s.wi = -light.direction;
+        s.radiance = light.intensity;
+        return s;
+    }
+    vec3 to = light.position - from;
+    float distance2 = dot(to, to);
+    s.wi = to * inversesqrt(distance2);
+    s.radiance = light.intensity / distance2;
+    if (light.kind == LIGHT_SPOT) {
+        // KHR_lights_punctual: the square of a linear ramp in the cosine between the cones.
+        float ramp = (dot(-s.wi, light.direction) - light.cos_outer) / max(light.cos_inner - light.cos_outer, 1.0e-6);
+        s.radiance *= square(clamp(ramp, 0.0, 1.0));
+    }
+    if (!(distance2 > 0.0)) {
+        s.pdf = 0.0;
+    }
+    return s;
+}
+
+// A light for the point `from`. pdf 0 stands for "none this time".
+LightSample light_sample(vec3 from, vec4 u)
+{
+    LightSample s;
+    s.pdf = 0.0;
+    float choice = u.x;
+    if (HAS_ENVIRONMENT) {
+        if (choice < params.env_choice) {
+            EnvironmentSample e = environment_sample(vec3(choice / params.env_choice, u.yz), u.w);
+            s.wi = e.wi;
+            s.is_infinite = true;
+            s.is_delta = false;
+            s.radiance = e.radiance;
+            s.pdf = e.pdf;
+            return s;
+        }
+        choice = (choice - params.env_choice) / params.table_choice;
+    }
+    if ((!HAS_AREA_LIGHTS && !HAS_PUNCTUAL) || params.light_count == 0u) {
+        return s;
+    }
+    uint index = min(uint(choice * float(params.light_count)), params.light_count - 1u);
+    Light light = lights[index];
+    if (u.w >= light.keep) {
+        light = lights[light.alias];
+    }
+    if (HAS_AREA_LIGHTS && (!HAS_PUNCTUAL || light.kind == LIGHT_TRIANGLE)) {
+        return light_sample_triangle(light, from, u.yz);
+    }
+    return light_sample_punctual(light, from);
+}
+
+#endif

@@ -1,0 +1,58 @@
+// Constants, frames, robust ray origins.
+//
+// [Duff17] Duff et al., Building an Orthonormal Basis, Revisited, JCGT 6(1).
+// [Woop13] Woop, Benthin, Wald, Watertight Ray/Triangle Intersection, JCGT 2(1).
+
+#ifndef MATH_GLSL
+#define MATH_GLSL
+
+const float PI = 3.14159265358979323846;
+const float INV_PI = 0.31830988618379067154;
+const float TWO_PI = 6.28318530717958647692;
+// End of a ray that may go as far as it likes; its square is not used.
+const float T_FAR = 3.0e38;
+// Unit roundoff of fp32.
+const float EPSILON = 5.9604645e-8;
+
+// Whether x is neither infinite nor NaN, by its bits: compilers may assume that
+// isnan() and isinf() are false.
+bool is_finite(float x)
+{
+    return (floatBitsToUint(x) & 0x7F800000u) != 0x7F800000u;
+}
+
+bool is_finite(vec3 v)
+{
+    return is_finite(v.x) && is_finite(v.y) && is_finite(v.z);
+}
+
+float max_component(vec3 v)
+{
+    return max(v.x, max(v.y, v.z));
+}
+
+float square(float x)
+{
+    return x * x;
+}
+
+// Orthonormal frame whose third column is the unit vector n. [Duff17]
+mat3 frame_from_z(vec3 n)
+{
+    float s = n.z >= 0.0 ? 1.0 : -1.0;
+    float a = -1.0 / (s + n.z);
+    float b = n.x * n.y * a;
+    return mat3(vec3(1.0 + s * n.x * n.x * a, s * b, -s * n.x),
+                vec3(b, s + n.y * n.y * a, -n.y),
+                n);
+}
+
+// Origin of a ray that leaves the point p in a direction on the side of `side`,
+// a vector along the geometric normal: moved off the surface by the bound on the
+// error of p, so that the surface that holds p is not met again.
+vec3 offset_origin(vec3 p, vec3 error, vec3 unit_side)
+{
+    return p + unit_side * dot(abs(unit_side), error);
+}
+
+#endif

@@ -1,0 +1,284 @@
+// From a hit to what shading needs: position with its error, normals, material
+// with its textures. Everything is in world space; normals face the side that
+// wo is on.
+//
+// [Schuessler17] Schüßler et al., Microfacet-based Normal Mapping, on why a
+// shading normal can make visible points black.
+
+#ifndef SURFACE_GLSL
+#define SURFACE_GLSL
+
+#include "math.glsl"
+#include "texture.glsl"
+#include "traverse.glsl"
+
+// Roundings in a hit point, relative to the magnitudes that enter it: three in
+// the edge form, one in the vertices' own transform, doubled for safety.
+const float POSITION_ROUNDINGS = 8.0;
+// Smallest cosine between wo and the shading normal; see surface_bend.
+const float MIN_SHADING_COSINE = 1.0e-3;
+
+struct SurfacePoint {
+    vec3 position;
+    vec3 error;        // bound on the error of each component of position
+    vec3 ng;           // unit geometric normal on the side of wo
+    vec3 ns;           // unit shading normal; dot(ns, wo) > 0
+    bool is_front;     // wo is on the side that the winding calls front
+    float area;        // of the triangle, m²
+    float alpha;       // coverage: 1 unless the material blends
+    vec3 emission;     // radiance towards wo, cd/m²
+    float emission_pdf;
+    vec3 base_color;
+    float metallic;
+    float roughness;   // perceptual
+    vec3 dielectric_f0;
+    float dielectric_f90;
+};
+
+// World-space corner and edges of a triangle, with the error of points on it.
+struct TriangleShape {
+    vec3 v0;
+    vec3 e1;
+    vec3 e2;
+    vec3 error;
+    bool is_mirrored;
+};
+
+// Texture coordinates of the corners.
+struct TriangleUv {
+    vec2 a;
+    vec2 b;
+    vec2 c;
+};
+
+uvec4 surface_triangle(uint instance, uint primitive)
+{
+    uint first = HAS_INSTANCES ? instances[instance].first_triangle : 0u;
+    return texelFetch(triangles, int(first + primitive));
+}
+
+TriangleShape surface_shape(uint instance, uvec4 triangle)
+{
+    vec3 a = texelFetch(vertices, int(2u * triangle.x)).xyz;
+    vec3 b = texelFetch(vertices, int(2u * triangle.y)).xyz;
+    vec3 c = texelFetch(vertices, int(2u * triangle.z)).xyz;
+    TriangleShape shape;
+    shape.is_mirrored = false;
+    vec3 magnitude = max(abs(a), max(abs(b), abs(c)));
+    if (HAS_INSTANCES && instances[instance].is_identity == 0u) {
+        Instance placed = instances[instance];
+        mat3 m = mat3(placed.world_from_object_x, placed.world_from_object_y, placed.world_from_object_z);
+        mat3 m_abs = mat3(abs(m[0]), abs(m[1]), abs(m[2]));
+        shape.v0 = m * a + placed.world_from_object_t;
+        shape.e1 = m * (b - a);
+        shape.e2 = m * (c - a);
+        // Roundings of the transform count against its largest terms.
+        magnitude = m_abs * magnitude + abs(placed.world_from_object_t);
+        shape.is_mirrored = placed.is_mirrored != 0u;
+    } else {
+        shape.v0 = a;
+        shape.e1 = b - a;
+        shape.e2 = c - a;
+    }
+    // A point may gain as much in the plane as the edges are long: the bound
+    // takes the largest component, so that an axis-aligned plane through 0 is
+    // left as well.
+    shape.error = vec3(POSITION_ROUNDINGS * EPSILON) * (magnitude + 0.25 * max_component(abs(shape.e1) + abs(shape.e2)));
+    return shape;
+}
+
+TriangleUv surface_uv(uvec4 triangle, uint set)
+{
+    if (HAS_ATTRIBUTES && set == 1u) {
+        return TriangleUv(texelFetch(attributes, int(3u * triangle.x + 2u)).xy,
+                          texelFetch(attributes, int(3u * triangle.y + 2u)).xy,
+                          texelFetch(attributes, int(3u * triangle.z + 2u)).xy);
+    }
+    return TriangleUv(vec2(texelFetch(vertices, int(2u * triangle.x)).w, texelFetch(vertices, int(2u * triangle.x + 1u)).w),
+                      vec2(texelFetch(vertices, int(2u * triangle.y)).w, texelFetch(vertices, int(2u * triangle.y + 1u)).w),
+                      vec2(texelFetch(vertices, int(2u * triangle.z)).w, texelFetch(vertices, int(2u * triangle.z + 1u)).w));
+}
+
+vec2 surface_uv_at(TriangleUv uv, vec2 bary)
+{
+    return uv.a + bary.x * (uv.b - uv.a) + bary.y * (uv.c - uv.a);
+}
+
+// Value of a texture slot, or 1 where it is empty.
+vec4 surface_texture(Material material, uint slot, uvec4 triangle, vec2 bary)
+{
+    if (!HAS_TEXTURES || (material.flags & MATERIAL_HAS_TEXTURES) == 0u) {
+        return vec4(1.0);
+    }
+    TextureUse use = texture_uses[material.first_texture + slot];
+    if (use.first_texel == NONE) {
+        return vec4(1.0);
+    }
+    return texture_sample(use, surface_uv_at(surface_uv(triangle, use.uv_set), bary));
+}
+
+vec4 surface_vertex_color(uvec4 triangle, vec2 bary)
+{
+    if (!HAS_ATTRIBUTES || (triangle.w & TRIANGLE_HAS_COLORS) == 0u) {
+        return vec4(1.0);
+    }
+    vec4 a = texelFetch(attributes, int(3u * triangle.x + 1u));
+    vec4 b = texelFetch(attributes, int(3u * triangle.y + 1u));
+    vec4 c = texelFetch(attributes, int(3u * triangle.z + 1u));
+    return a + bary.x * (b - a) + bary.y * (c - a);
+}
+
+// Base colour with alpha before it is interpreted.
+vec4 surface_base_color(Material material, uvec4 triangle, vec2 bary)
+{
+    return vec4(material.base_color, material.alpha)
+        * surface_texture(material, TEXTURE_BASE_COLOR, triangle, bary) * surface_vertex_color(triangle, bary);
+}
+
+bool surface_is_opaque(uint instance, uint primitive, vec2 bary)
+{
+    uvec4 triangle = surface_triangle(instance, primitive);
+    Material material = materials[triangle.w & TRIANGLE_MATERIAL_MASK];
+    return surface_base_color(material, triangle, bary).a >= material.alpha_cutoff;
+}
+
+// Fraction of the light that the surface stops.
+float surface_coverage(uint instance, uint primitive, vec2 bary)
+{
+    uvec4 triangle = surface_triangle(instance, primitive);
+    Material material = materials[triangle.w & TRIANGLE_MATERIAL_MASK];
+    if ((material.flags & MATERIAL_BLEND) == 0u) {
+        return 1.0;
+    }
+    return clamp(surface_base_color(material, triangle, bary).a, 0.0, 1.0);
+}
+
+// Radiance that leaves a point of an emitter, before its side is asked.
+vec3 surface_emission(Material material, uvec4 triangle, vec2 bary)
+{
+    vec3 emission = material.emission * surface_texture(material, TEXTURE_EMISSION, triangle, bary).rgb;
+    // Unlit materials show their base colour, of which vertex colours are a part.
+    return (material.flags & MATERIAL_UNLIT) != 0u ? emission * surface_vertex_color(triangle, bary).rgb : emission;
+}
+
+// The normal n turned towards wo until it is visible: an interpolated or mapped
+// normal may face away at grazing view, and the point would be black.
+vec3 surface_bend(vec3 n, vec3 wo)
+{
+    float cosine = dot(n, wo);
+    return cosine >= MIN_SHADING_COSINE ? n : normalize(n + (MIN_SHADING_COSINE - cosine) * wo);
+}
+
+// Object-space direction of a normal carried to world space, not normalised.
+vec3 surface_world_normal(uint instance, vec3 n)
+{
+    if (HAS_INSTANCES && instances[instance].is_identity == 0u) {
+        Instance placed = instances[instance];
+        return vec3(dot(placed.object_from_world_x, n), dot(placed.object_from_world_y, n), dot(placed.object_from_world_z, n));
+    }
+    return n;
+}
+
+// Mapped normal about the unit normal n of the front side. The bitangent points
+// against dp/dv, since v grows downwards in an image and green is up.
+vec3 surface_mapped_normal(Material material, uint instance, uvec4 triangle, TriangleShape shape, vec2 bary, vec3 n)
+{
+    TextureUse use = texture_uses[material.first_texture + TEXTURE_NORMAL];
+    if (use.first_texel == NONE) {
+        return n;
+    }
+    TriangleUv uv = surface_uv(triangle, use.uv_set);
+    vec3 m = texture_sample(use, surface_uv_at(uv, bary)).xyz * 2.0 - 1.0;
+    m.xy *= material.normal_scale;
+
+    vec3 tangent;
+    float sign_b;
+    if (HAS_ATTRIBUTES && (triangle.w & TRIANGLE_HAS_TANGENTS) != 0u) {
+        vec4 a = texelFetch(attributes, int(3u * triangle.x));
+        vec4 b = texelFetch(attributes, int(3u * triangle.y));
+        vec4 c = texelFetch(attributes, int(3u * triangle.z));
+        tangent = a.xyz + bary.x * (b.xyz - a.xyz) + bary.y * (c.xyz - a.xyz);
+        if (HAS_INSTANCES && instances[instance].is_identity == 0u) {
+            tangent = mat3(instances[instance].world_from_object_x, instances[instance].world_from_object_y,
+                           instances[instance].world_from_object_z) * tangent;
+        }
+        sign_b = shape.is_mirrored ? -a.w : a.w;
+    } else {
+        vec2 d1 = uv.b - uv.a;
+        vec2 d2 = uv.c - uv.a;
+        float det = d1.x * d2.y - d2.x * d1.y;
+        float sign_det = det < 0.0 ? -1.0 : 1.0;
+        tangent = sign_det * (d2.y * shape.e1 - d1.y * shape.e2);
+        vec3 dpdv = sign_det * (d1.x * shape.e2 - d2.x * shape.e1);
+        sign_b = dot(cross(n, tangent), dpdv) > 0.0 ? -1.0 : 1.0;
+    }
+    tangent -= n * dot(n, tangent);
+    float length2 = dot(tangent, tangent);
+    if (!(length2 > 0.0)) {
+        return n;
+    }
+    tangent *= inversesqrt(length2);
+    vec3 mapped = m.x * tangent + m.y * sign_b * cross(n, tangent) + m.z * n;
+    float mapped2 = dot(mapped, mapped);
+    return mapped2 > 0.0 ? mapped * inversesqrt(mapped2) : n;
+}
+
+// Everything about the point that a ray from direction −wo met.
+SurfacePoint surface_point(Hit hit, vec3 wo)
+{
+    uvec4 triangle = surface_triangle(hit.instance, hit.primitive);
+    TriangleShape shape = surface_shape(hit.instance, triangle);
+    Material material = materials[triangle.w & TRIANGLE_MATERIAL_MASK];
+
+    SurfacePoint s;
+    // Edge form: it stays in the plane to two roundings, unlike a + b + c weighted.
+    s.position = shape.v0 + hit.bary.x * shape.e1 + hit.bary.y * shape.e2;
+    s.error = shape.error;
+    vec3 cross_edges = cross(shape.e1, shape.e2);
+    float doubled_area = length(cross_edges);
+    vec3 front = cross_edges / doubled_area * (shape.is_mirrored ? -1.0 : 1.0);
+    s.area = 0.5 * doubled_area;
+    s.is_front = dot(front, wo) >= 0.0;
+    s.ng = s.is_front ? front : -front;
+    s.ns = s.ng;
+    if (HAS_NORMALS) {
+        vec3 n = front;
+        if ((triangle.w & TRIANGLE_HAS_NORMALS) != 0u) {
+            vec3 a = texelFetch(vertices, int(2u * triangle.x + 1u)).xyz;
+            vec3 b = texelFetch(vertices, int(2u * triangle.y + 1u)).xyz;
+            vec3 c = texelFetch(vertices, int(2u * triangle.z + 1u)).xyz;
+            vec3 interpolated = surface_world_normal(hit.instance, a + hit.bary.x * (b - a) + hit.bary.y * (c - a));
+            float length2 = dot(interpolated, interpolated);
+            n = length2 > 0.0 ? interpolated * inversesqrt(length2) : front;
+        }
+        if (HAS_TEXTURES && (material.flags & MATERIAL_HAS_TEXTURES) != 0u) {
+            n = surface_mapped_normal(material, hit.instance, triangle, shape, hit.bary, n);
+        }
+        s.ns = surface_bend(s.is_front ? n : -n, wo);
+    }
+
+    vec4 base_color = surface_base_color(material, triangle, hit.bary);
+    s.base_color = base_color.rgb;
+    s.alpha = HAS_BLEND && (material.flags & MATERIAL_BLEND) != 0u ? clamp(base_color.a, 0.0, 1.0) : 1.0;
+    s.emission = vec3(0.0);
+    s.emission_pdf = 0.0;
+    if (HAS_AREA_LIGHTS && material.emission_pdf > 0.0 && (s.is_front || (material.flags & MATERIAL_DOUBLE_SIDED) != 0u)) {
+        s.emission = surface_emission(material, triangle, hit.bary);
+        s.emission_pdf = material.emission_pdf;
+    }
+    s.metallic = 0.0;
+    s.roughness = 1.0;
+    s.dielectric_f0 = vec3(0.0);
+    s.dielectric_f90 = 0.0;
+    if (HAS_SPECULAR) {
+        vec4 factors = surface_texture(material, TEXTURE_METALLIC_ROUGHNESS, triangle, hit.bary);
+        s.roughness = material.roughness * factors.g;
+        s.metallic = material.metallic * factors.b;
+        s.dielectric_f90 = material.specular * surface_texture(material, TEXTURE_SPECULAR, triangle, hit.bary).a;
+        vec3 tint = surface_texture(material, TEXTURE_SPECULAR_COLOR, triangle, hit.bary).rgb;
+        s.dielectric_f0 = min(material.specular_f0 * tint, vec3(1.0)) * s.dielectric_f90;
+    }
+    return s;
+}
+
+#endif

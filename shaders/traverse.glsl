@@ -1,0 +1,27 @@
+// The traversal contract: what a ray meets. The entry chooses the backend.
+// Directions are unit length, t is in metres and strictly inside (t_min, t_max);
+// nothing is culled; a cut-out triangle is asked through surface_is_opaque.
+
+#ifndef TRAVERSE_GLSL
+#define TRAVERSE_GLSL
+
+#include "scene.glsl"
+
+struct Hit {
+    float t;        // metres
+    vec2 bary;      // weights of the second and third vertex
+    uint instance;
+    uint primitive; // within the instance's group
+};
+
+// Deterministic alpha test; defined in surface.glsl.
+bool surface_is_opaque(uint instance, uint primitive, vec2 bary);
+
+#ifdef TRAVERSE_QUERY
+#include "traverse_query.glsl"
+#endif
+#ifdef TRAVERSE_SOFTWARE
+#include "traverse_software.glsl"
+#endif
+
+#endif
