@@ -17,6 +17,8 @@ const SHADERS: &[(&str, &[&str], &str)] = &[
         &["TRAVERSE_QUERY", "KERNEL_PROBE"],
         "probe_query",
     ),
+    ("tests/resources.comp", &[], "test_resources"),
+    ("tests/rays.comp", &[], "test_rays"),
 ];
 
 fn main() {

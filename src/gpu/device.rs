@@ -1,0 +1,279 @@
+//! The one root of everything on the GPU: instance, device, queue, allocator.
+
+use std::ffi::CString;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+use ash::{khr, vk};
+use gpu_allocator::vulkan::{Allocator, AllocatorCreateDesc};
+use gpu_allocator::{AllocationSizes, AllocatorDebugSettings};
+
+use super::caps::{Caps, DeviceKind, RAY_EXTENSIONS};
+use super::failed;
+use super::instance::{Instance, ValidationLog};
+use crate::error::{Error, Result};
+
+/// Memory is taken from the driver in blocks of this size; what is larger gets a
+/// block of its own. Small enough to leave shared GPUs room, large enough that
+/// a scene stays far below the limit on the number of blocks (4096 at least).
+const DEVICE_BLOCK_BYTES: u64 = 64 << 20;
+const HOST_BLOCK_BYTES: u64 = 32 << 20;
+
+/// Which device to open and what it must be able to do.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct DeviceRequest<'a> {
+    /// Index in [`enumerate`]'s list or part of the name, in any case; `None`
+    /// is the fastest kind that can do what is asked.
+    pub select: Option<&'a str>,
+    /// Runs the Khronos validation layer with synchronisation validation.
+    pub validation: bool,
+    /// Enables acceleration structures and ray query.
+    pub ray_query: bool,
+}
+
+/// The devices of this machine in the loader's order. Fails with
+/// [`Error::Unsupported`] where there is no loader, no driver or no device.
+pub fn enumerate() -> Result<Vec<Caps>> {
+    let instance = Instance::new(false)?;
+    Ok(query_all(&instance)?
+        .into_iter()
+        .map(|(_, caps)| caps)
+        .collect())
+}
+
+fn query_all(instance: &Instance) -> Result<Vec<(vk::PhysicalDevice, Caps)>> {
+    let devices = instance.physical_devices()?;
+    (0..)
+        .zip(devices)
+        .map(|(index, physical)| Ok((physical, Caps::query(instance, physical, index)?)))
+        .collect()
+}
+
+/// An open device. Everything made from it holds it, so it goes last.
+pub struct Device {
+    // Fields are dropped in this order, and it matters: the allocator frees its
+    // blocks through the device; the device (in `root`) is destroyed before the
+    // instance, which it holds. Nothing is in flight by then: `run` has waited.
+    allocator: Mutex<Allocator>,
+    pub(super) acceleration: Option<khr::acceleration_structure::Device>,
+    names: Option<ash::ext::debug_utils::Device>,
+    queue: Mutex<vk::Queue>,
+    caps: Caps,
+    root: Root,
+}
+
+/// The raw device and, dropped after it, its instance.
+struct Root {
+    raw: ash::Device,
+    instance: Instance,
+}
+
+impl Drop for Root {
+    fn drop(&mut self) {
+        // SAFETY: all objects of the device held it and are gone. Waiting fails
+        // only on a lost device, whose objects may be destroyed all the same.
+        unsafe {
+            let _ = self.raw.device_wait_idle();
+            self.raw.destroy_device(None);
+        }
+    }
+}
+
+impl Device {
+    /// Opens a device. Fails with [`Error::Unsupported`] where none was found,
+    /// where the selection fits none, or where something that was asked for is missing.
+    pub fn open(request: &DeviceRequest<'_>) -> Result<Arc<Self>> {
+        let instance = Instance::new(request.validation)?;
+        let (physical, caps) = choose(query_all(&instance)?, request)?;
+        let raw = create(&instance, physical, &caps, request.ray_query)?;
+        let root = Root { raw, instance };
+        let Root { raw, instance } = &root;
+
+        // SAFETY: the family was enabled with one queue at creation.
+        let queue = unsafe { raw.get_device_queue(caps.queue_family, 0) };
+        let allocator = Allocator::new(&AllocatorCreateDesc {
+            instance: instance.raw.clone(),
+            device: raw.clone(),
+            physical_device: physical,
+            debug_settings: AllocatorDebugSettings::default(),
+            buffer_device_address: request.ray_query,
+            allocation_sizes: AllocationSizes::new(DEVICE_BLOCK_BYTES, HOST_BLOCK_BYTES),
+        })
+        .map_err(|error| Error::Unsupported {
+            what: format!("memory of {}", caps.name),
+            missing: error.to_string(),
+        })?;
+        tracing::info!(device = caps.name, driver = caps.driver, "device opened");
+        Ok(Arc::new(Self {
+            allocator: Mutex::new(allocator),
+            acceleration: request
+                .ray_query
+                .then(|| khr::acceleration_structure::Device::new(&instance.raw, raw)),
+            names: instance
+                .debug_utils
+                .then(|| ash::ext::debug_utils::Device::new(&instance.raw, raw)),
+            queue: Mutex::new(queue),
+            caps,
+            root,
+        }))
+    }
+
+    /// What this device can do.
+    pub fn caps(&self) -> &Caps {
+        &self.caps
+    }
+
+    /// Every error and warning of the validation layer so far; empty without validation.
+    pub fn validation_messages(&self) -> Vec<String> {
+        self.root.instance.log.messages()
+    }
+
+    /// The same list as an object that outlives the device.
+    pub fn validation_log(&self) -> Arc<ValidationLog> {
+        Arc::clone(&self.root.instance.log)
+    }
+
+    pub(super) fn raw(&self) -> &ash::Device {
+        &self.root.raw
+    }
+
+    /// The functions of VK_KHR_acceleration_structure, or why there are none.
+    pub(super) fn acceleration(&self) -> Result<&khr::acceleration_structure::Device> {
+        self.acceleration
+            .as_ref()
+            .ok_or_else(|| Error::Unsupported {
+                what: String::from("acceleration structures"),
+                missing: format!("{} was opened without ray query", self.caps.name),
+            })
+    }
+
+    /// The queue, and with it the right to let the GPU or the host touch memory.
+    pub(super) fn exclusive(&self) -> MutexGuard<'_, vk::Queue> {
+        self.queue.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    pub(super) fn allocator(&self) -> MutexGuard<'_, Allocator> {
+        self.allocator
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Names an object for debuggers and validation messages.
+    pub(super) fn set_name<H: vk::Handle>(&self, handle: H, name: &str) {
+        let Some(names) = &self.names else { return };
+        // A name with an inner NUL is not worth an error.
+        let Ok(name) = CString::new(name) else { return };
+        let info = vk::DebugUtilsObjectNameInfoEXT::default()
+            .object_handle(handle)
+            .object_name(&name);
+        // SAFETY: the handle belongs to this device and is not used elsewhere meanwhile: its
+        // owner has just made it. A failure (no host memory) costs the name only.
+        let _ = unsafe { names.set_debug_utils_object_name(&info) };
+    }
+}
+
+/// What keeps a device from serving the request, if anything does.
+fn obstacle(caps: &Caps, request: &DeviceRequest<'_>) -> Option<String> {
+    let needed = if request.ray_query {
+        &caps.ray_query
+    } else {
+        &caps.compute
+    };
+    needed.clone().err()
+}
+
+fn choose(
+    devices: Vec<(vk::PhysicalDevice, Caps)>,
+    request: &DeviceRequest<'_>,
+) -> Result<(vk::PhysicalDevice, Caps)> {
+    let what = if request.ray_query {
+        "a device with ray query"
+    } else {
+        "a device"
+    };
+    let listing = devices
+        .iter()
+        .map(|(_, caps)| match obstacle(caps, request) {
+            Some(missing) => format!("{} \"{}\" lacks {missing}", caps.index, caps.name),
+            None => format!("{} \"{}\"", caps.index, caps.name),
+        })
+        .collect::<Vec<_>>()
+        .join("; ");
+    if let Some(select) = request.select {
+        let (physical, caps) = find(devices, select).ok_or_else(|| Error::Unsupported {
+            what: format!("device \"{select}\""),
+            missing: format!("there is none of this index or name; there are: {listing}"),
+        })?;
+        return match obstacle(&caps, request) {
+            None => Ok((physical, caps)),
+            Some(missing) => Err(Error::Unsupported {
+                what: format!("{what}: \"{}\" lacks", caps.name),
+                missing,
+            }),
+        };
+    }
+    devices
+        .into_iter()
+        .filter(|(_, caps)| obstacle(caps, request).is_none())
+        .min_by_key(|(_, caps)| match caps.kind {
+            DeviceKind::Discrete => 0,
+            DeviceKind::Integrated => 1,
+            DeviceKind::Virtual => 2,
+            DeviceKind::Other => 3,
+            DeviceKind::Cpu => 4,
+        })
+        .ok_or_else(|| Error::Unsupported {
+            what: String::from(what),
+            missing: format!("none here can do it: {listing}"),
+        })
+}
+
+/// The device of this index, else the first one whose name contains the text.
+fn find(
+    mut devices: Vec<(vk::PhysicalDevice, Caps)>,
+    select: &str,
+) -> Option<(vk::PhysicalDevice, Caps)> {
+    let lower = select.to_lowercase();
+    let position = devices
+        .iter()
+        .position(|(_, caps)| select.parse() == Ok(caps.index))
+        .or_else(|| {
+            devices
+                .iter()
+                .position(|(_, caps)| caps.name.to_lowercase().contains(&lower))
+        })?;
+    Some(devices.swap_remove(position))
+}
+
+fn create(
+    instance: &Instance,
+    physical: vk::PhysicalDevice,
+    caps: &Caps,
+    ray_query: bool,
+) -> Result<ash::Device> {
+    let queues = [vk::DeviceQueueCreateInfo::default()
+        .queue_family_index(caps.queue_family)
+        .queue_priorities(&[1.0])];
+    let extensions: Vec<_> = RAY_EXTENSIONS.iter().map(|name| name.as_ptr()).collect();
+    let mut f12 = vk::PhysicalDeviceVulkan12Features::default()
+        .scalar_block_layout(true)
+        .buffer_device_address(ray_query);
+    let mut f13 = vk::PhysicalDeviceVulkan13Features::default().maintenance4(true);
+    let mut f_build =
+        vk::PhysicalDeviceAccelerationStructureFeaturesKHR::default().acceleration_structure(true);
+    let mut f_query = vk::PhysicalDeviceRayQueryFeaturesKHR::default().ray_query(true);
+    let mut info = vk::DeviceCreateInfo::default()
+        .queue_create_infos(&queues)
+        .push_next(&mut f12);
+    if caps.maintenance4 {
+        info = info.push_next(&mut f13);
+    }
+    if ray_query {
+        info = info
+            .enabled_extension_names(&extensions)
+            .push_next(&mut f_build)
+            .push_next(&mut f_query);
+    }
+    // SAFETY: `choose` has made sure that the device has all features and extensions asked for.
+    unsafe { instance.raw.create_device(physical, &info, None) }
+        .map_err(failed(format!("open device \"{}\"", caps.name)))
+}

@@ -1,0 +1,81 @@
+//! Mistakes made on purpose, so that tests can show that validation sees them.
+//! Nothing here is submitted: each fault is recorded (or made) and thrown away.
+
+use std::sync::Arc;
+
+use ash::vk;
+
+use super::buffer::Buffer;
+use super::commands::Commands;
+use super::device::Device;
+use super::failed;
+use super::pipeline::{BindSet, ComputePipeline};
+use crate::error::Result;
+
+/// Two dispatches that write the same buffer, with no barrier between them.
+pub fn missing_barrier(
+    device: &Arc<Device>,
+    pipeline: &ComputePipeline,
+    set: &BindSet,
+    push: &[u8],
+) -> Result<()> {
+    let commands = Commands::begin(device, "fault: missing barrier")?;
+    commands.bind(pipeline, Some(set), push);
+    for _ in 0..2 {
+        // SAFETY: never submitted; the fault is in the recording only.
+        unsafe { device.raw().cmd_dispatch(commands.raw(), 1, 1, 1) };
+    }
+    Ok(())
+}
+
+/// More work groups than the device runs.
+pub fn too_many_groups(
+    device: &Arc<Device>,
+    pipeline: &ComputePipeline,
+    set: &BindSet,
+    push: &[u8],
+) -> Result<()> {
+    let commands = Commands::begin(device, "fault: too many groups")?;
+    commands.bind(pipeline, Some(set), push);
+    let groups = device.caps().max_groups[1].saturating_add(1);
+    // SAFETY: as above.
+    unsafe { device.raw().cmd_dispatch(commands.raw(), 1, groups, 1) };
+    Ok(())
+}
+
+/// A dispatch of a pipeline whose resources were never bound.
+pub fn unbound_set(device: &Arc<Device>, pipeline: &ComputePipeline, push: &[u8]) -> Result<()> {
+    let commands = Commands::begin(device, "fault: unbound set")?;
+    commands.bind(pipeline, None, push);
+    // SAFETY: as above.
+    unsafe { device.raw().cmd_dispatch(commands.raw(), 1, 1, 1) };
+    Ok(())
+}
+
+/// A copy that starts within the buffers and ends outside.
+pub fn copy_past_end(device: &Arc<Device>, source: &Buffer, target: &Buffer) -> Result<()> {
+    let commands = Commands::begin(device, "fault: copy past the end")?;
+    let region = vk::BufferCopy {
+        src_offset: 0,
+        dst_offset: 0,
+        size: source.bytes().max(target.bytes()) + 16,
+    };
+    // SAFETY: as above.
+    unsafe {
+        device
+            .raw()
+            .cmd_copy_buffer(commands.raw(), source.raw(), target.raw(), &[region]);
+    }
+    Ok(())
+}
+
+/// A buffer that nobody destroys; reported when the device goes.
+pub fn leaked_buffer(device: &Arc<Device>) -> Result<()> {
+    let info = vk::BufferCreateInfo::default()
+        .size(16)
+        .usage(vk::BufferUsageFlags::TRANSFER_SRC);
+    // SAFETY: a valid description; forgetting the handle is the fault.
+    let _forgotten = unsafe { device.raw().create_buffer(&info, None) }
+        .map_err(failed("create a buffer to forget"))?;
+    Ok(())
+}

@@ -1,0 +1,424 @@
+//! Compute pipelines and the sets of resources they read: made from plain lists
+//! of bindings and constants. Both are cheap handles.
+
+use std::sync::Arc;
+
+use ash::vk;
+
+use super::accel::Tlas;
+use super::buffer::Buffer;
+use super::device::Device;
+use super::failed;
+use crate::error::{Error, Result};
+
+/// What a shader expects at a binding.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum BindingKind {
+    /// A uniform buffer.
+    Uniform,
+    /// A storage buffer.
+    Storage,
+    /// A uniform texel buffer.
+    Texel,
+    /// A top-level acceleration structure.
+    AccelerationStructure,
+}
+
+impl BindingKind {
+    const ALL: [Self; 4] = [
+        Self::Uniform,
+        Self::Storage,
+        Self::Texel,
+        Self::AccelerationStructure,
+    ];
+
+    fn vulkan(self) -> vk::DescriptorType {
+        match self {
+            Self::Uniform => vk::DescriptorType::UNIFORM_BUFFER,
+            Self::Storage => vk::DescriptorType::STORAGE_BUFFER,
+            Self::Texel => vk::DescriptorType::UNIFORM_TEXEL_BUFFER,
+            Self::AccelerationStructure => vk::DescriptorType::ACCELERATION_STRUCTURE_KHR,
+        }
+    }
+}
+
+/// What is put at a binding.
+#[derive(Clone, Copy)]
+pub enum Resource<'a> {
+    /// A whole buffer, as uniform, storage or texel buffer.
+    Buffer(&'a Buffer),
+    /// A scene to trace rays in.
+    Acceleration(&'a Tlas),
+}
+
+/// A compute pipeline to be made.
+#[derive(Clone, Copy, Debug)]
+pub struct PipelineDesc<'a> {
+    /// For messages and debuggers.
+    pub name: &'a str,
+    /// The module; its entry point is `main`.
+    pub spirv: &'a [u32],
+    /// Binding numbers of set 0 and what stands there.
+    pub bindings: &'a [(u32, BindingKind)],
+    /// Specialisation constants: id and 32-bit value (bools as 0 or 1, floats as bits).
+    pub constants: &'a [(u32, u32)],
+    /// Size of the push constants, bytes; a multiple of four.
+    pub push_bytes: u32,
+}
+
+/// A compiled compute shader; clones share it.
+#[derive(Clone)]
+pub struct ComputePipeline(Arc<PipelineInner>);
+
+struct PipelineInner {
+    device: Arc<Device>,
+    name: String,
+    set_layout: vk::DescriptorSetLayout,
+    layout: vk::PipelineLayout,
+    raw: vk::Pipeline,
+    bindings: Vec<(u32, BindingKind)>,
+    push_bytes: u32,
+}
+
+impl Drop for PipelineInner {
+    fn drop(&mut self) {
+        let device = self.device.raw();
+        // SAFETY: recordings and sets hold the pipeline, so nothing uses it; null handles are ignored.
+        unsafe {
+            device.destroy_pipeline(self.raw, None);
+            device.destroy_pipeline_layout(self.layout, None);
+            device.destroy_descriptor_set_layout(self.set_layout, None);
+        }
+    }
+}
+
+/// A shader module for the time of a pipeline's creation.
+struct Module<'a> {
+    device: &'a Device,
+    raw: vk::ShaderModule,
+}
+
+impl Drop for Module<'_> {
+    fn drop(&mut self) {
+        // SAFETY: modules may go once the pipeline was made.
+        unsafe { self.device.raw().destroy_shader_module(self.raw, None) };
+    }
+}
+
+impl ComputePipeline {
+    /// Compiles the pipeline. Fails with [`Error::Unsupported`] where the device
+    /// cannot bind so much, and with [`Error::Vulkan`] where the driver refuses.
+    pub fn new(device: &Arc<Device>, desc: &PipelineDesc<'_>) -> Result<Self> {
+        check_limits(device, desc)?;
+        let mut inner = PipelineInner {
+            device: Arc::clone(device),
+            name: desc.name.to_owned(),
+            set_layout: vk::DescriptorSetLayout::null(),
+            layout: vk::PipelineLayout::null(),
+            raw: vk::Pipeline::null(),
+            bindings: desc.bindings.to_vec(),
+            push_bytes: desc.push_bytes,
+        };
+        inner
+            .create_layouts()
+            .and_then(|()| inner.compile(desc))
+            .map_err(failed(format!("create pipeline \"{}\"", desc.name)))?;
+        device.set_name(inner.raw, desc.name);
+        Ok(Self(Arc::new(inner)))
+    }
+
+    pub(super) fn raw(&self) -> vk::Pipeline {
+        self.0.raw
+    }
+
+    pub(super) fn layout(&self) -> vk::PipelineLayout {
+        self.0.layout
+    }
+
+    pub(super) fn name(&self) -> &str {
+        &self.0.name
+    }
+
+    pub(super) fn push_bytes(&self) -> u32 {
+        self.0.push_bytes
+    }
+
+    pub(super) fn is_of(&self, device: &Arc<Device>) -> bool {
+        Arc::ptr_eq(&self.0.device, device)
+    }
+}
+
+fn check_limits(device: &Device, desc: &PipelineDesc<'_>) -> Result<()> {
+    let caps = device.caps();
+    let storage = desc
+        .bindings
+        .iter()
+        .filter(|(_, kind)| *kind == BindingKind::Storage)
+        .count();
+    let too_much = |missing| {
+        Err(Error::Unsupported {
+            what: format!("pipeline \"{}\"", desc.name),
+            missing,
+        })
+    };
+    if storage > caps.max_storage_buffers as usize {
+        return too_much(format!(
+            "it binds {storage} storage buffers, {} takes {}",
+            caps.name, caps.max_storage_buffers
+        ));
+    }
+    if desc.push_bytes > caps.max_push_bytes {
+        return too_much(format!(
+            "it has {} bytes of push constants, {} takes {}",
+            desc.push_bytes, caps.name, caps.max_push_bytes
+        ));
+    }
+    let traces = |(_, kind): &(u32, BindingKind)| *kind == BindingKind::AccelerationStructure;
+    if desc.bindings.iter().any(traces) {
+        device.acceleration()?;
+    }
+    assert!(
+        desc.push_bytes % 4 == 0,
+        "push constants of \"{}\" are not whole words",
+        desc.name
+    );
+    Ok(())
+}
+
+impl PipelineInner {
+    fn create_layouts(&mut self) -> Result<(), vk::Result> {
+        let device = self.device.raw();
+        let stage = vk::ShaderStageFlags::COMPUTE;
+        let bindings: Vec<_> = self
+            .bindings
+            .iter()
+            .map(|&(binding, kind)| {
+                vk::DescriptorSetLayoutBinding::default()
+                    .binding(binding)
+                    .descriptor_type(kind.vulkan())
+                    .descriptor_count(1)
+                    .stage_flags(stage)
+            })
+            .collect();
+        let info = vk::DescriptorSetLayoutCreateInfo::default().bindings(&bindings);
+        // SAFETY: the description is plain data that outlives the call.
+        self.set_layout = unsafe { device.create_descriptor_set_layout(&info, None) }?;
+        let ranges = [vk::PushConstantRange::default()
+            .stage_flags(stage)
+            .size(self.push_bytes)];
+        let layouts = [self.set_layout];
+        let mut info = vk::PipelineLayoutCreateInfo::default().set_layouts(&layouts);
+        if self.push_bytes > 0 {
+            info = info.push_constant_ranges(&ranges);
+        }
+        // SAFETY: the set layout was just made; the range is within the device's limit.
+        self.layout = unsafe { device.create_pipeline_layout(&info, None) }?;
+        Ok(())
+    }
+
+    fn compile(&mut self, desc: &PipelineDesc<'_>) -> Result<(), vk::Result> {
+        let device = self.device.raw();
+        let info = vk::ShaderModuleCreateInfo::default().code(desc.spirv);
+        let module = Module {
+            device: &self.device,
+            // SAFETY: the module is trusted (see the safety policy in mod.rs).
+            raw: unsafe { device.create_shader_module(&info, None) }?,
+        };
+        let entries: Vec<_> = (0..)
+            .zip(desc.constants)
+            .map(|(index, &(id, _))| vk::SpecializationMapEntry {
+                constant_id: id,
+                offset: index * 4,
+                size: 4,
+            })
+            .collect();
+        let values: Vec<u32> = desc.constants.iter().map(|&(_, value)| value).collect();
+        let constants = vk::SpecializationInfo::default()
+            .map_entries(&entries)
+            .data(bytemuck::cast_slice(&values));
+        let stage = vk::PipelineShaderStageCreateInfo::default()
+            .stage(vk::ShaderStageFlags::COMPUTE)
+            .module(module.raw)
+            .name(c"main")
+            .specialization_info(&constants);
+        let info = vk::ComputePipelineCreateInfo::default()
+            .stage(stage)
+            .layout(self.layout);
+        let cache = vk::PipelineCache::null();
+        // SAFETY: layout and module are alive and the map entries lie within `values`.
+        let result = unsafe { device.create_compute_pipelines(cache, &[info], None) };
+        self.raw = result.map_err(|(_, result)| result)?[0];
+        Ok(())
+    }
+}
+
+/// Resources for all bindings of one pipeline; clones share it.
+#[derive(Clone)]
+pub struct BindSet(Arc<SetInner>);
+
+struct SetInner {
+    pipeline: ComputePipeline,
+    name: String,
+    pool: vk::DescriptorPool,
+    raw: vk::DescriptorSet,
+    /// What the descriptors point to, kept alive as long as they do.
+    _buffers: Vec<Buffer>,
+    _scenes: Vec<Tlas>,
+}
+
+impl Drop for SetInner {
+    fn drop(&mut self) {
+        // SAFETY: recordings hold their sets, so nothing uses this one; it goes with its pool.
+        unsafe {
+            self.pipeline
+                .0
+                .device
+                .raw()
+                .destroy_descriptor_pool(self.pool, None);
+        }
+    }
+}
+
+impl BindSet {
+    /// Points every binding of the pipeline to a resource. Panics where a binding
+    /// is missing, unknown, or of another kind than the resource.
+    pub fn new(
+        pipeline: &ComputePipeline,
+        name: &str,
+        resources: &[(u32, Resource<'_>)],
+    ) -> Result<Self> {
+        let bindings = &pipeline.0.bindings;
+        for &(binding, _) in resources {
+            assert!(
+                bindings.iter().any(|&(b, _)| b == binding),
+                "\"{name}\": pipeline \"{}\" has no binding {binding}",
+                pipeline.name()
+            );
+        }
+        let mut inner = SetInner {
+            pipeline: pipeline.clone(),
+            name: name.to_owned(),
+            pool: vk::DescriptorPool::null(),
+            raw: vk::DescriptorSet::null(),
+            _buffers: Vec::new(),
+            _scenes: Vec::new(),
+        };
+        inner
+            .allocate()
+            .map_err(failed(format!("create bind set \"{name}\"")))?;
+        for &(binding, kind) in bindings {
+            let resource = resources.iter().find(|&&(b, _)| b == binding);
+            let &(_, resource) = resource.unwrap_or_else(|| {
+                panic!(
+                    "\"{name}\" lacks binding {binding} of pipeline \"{}\"",
+                    pipeline.name()
+                )
+            });
+            inner.write(binding, kind, resource);
+        }
+        pipeline.0.device.set_name(inner.raw, name);
+        Ok(Self(Arc::new(inner)))
+    }
+
+    pub(super) fn raw(&self) -> vk::DescriptorSet {
+        self.0.raw
+    }
+
+    pub(super) fn name(&self) -> &str {
+        &self.0.name
+    }
+
+    pub(super) fn fits(&self, pipeline: &ComputePipeline) -> bool {
+        Arc::ptr_eq(&self.0.pipeline.0, &pipeline.0)
+    }
+}
+
+impl SetInner {
+    fn allocate(&mut self) -> Result<(), vk::Result> {
+        let pipeline = &self.pipeline.0;
+        let device = pipeline.device.raw();
+        let sizes: Vec<_> = BindingKind::ALL
+            .into_iter()
+            .map(|kind| vk::DescriptorPoolSize {
+                ty: kind.vulkan(),
+                descriptor_count: pipeline.bindings.iter().filter(|b| b.1 == kind).count() as u32,
+            })
+            .filter(|size| size.descriptor_count > 0)
+            .collect();
+        let info = vk::DescriptorPoolCreateInfo::default()
+            .max_sets(1)
+            .pool_sizes(&sizes);
+        // SAFETY: the description is plain data that outlives the call.
+        self.pool = unsafe { device.create_descriptor_pool(&info, None) }?;
+        let layouts = [pipeline.set_layout];
+        let info = vk::DescriptorSetAllocateInfo::default()
+            .descriptor_pool(self.pool)
+            .set_layouts(&layouts);
+        // SAFETY: the pool was made for exactly one set of this layout.
+        self.raw = unsafe { device.allocate_descriptor_sets(&info) }?[0];
+        Ok(())
+    }
+
+    fn write(&mut self, binding: u32, kind: BindingKind, resource: Resource<'_>) {
+        let device = Arc::clone(&self.pipeline.0.device);
+        self.check(binding, kind, resource);
+        let mut buffers = [vk::DescriptorBufferInfo::default()];
+        let mut views = [vk::BufferView::null()];
+        let mut scenes = [vk::AccelerationStructureKHR::null()];
+        match resource {
+            Resource::Buffer(buffer) => {
+                buffers[0] = vk::DescriptorBufferInfo {
+                    buffer: buffer.raw(),
+                    offset: 0,
+                    range: vk::WHOLE_SIZE,
+                };
+                views[0] = buffer.view();
+                self._buffers.push(buffer.clone());
+            }
+            Resource::Acceleration(tlas) => {
+                scenes[0] = tlas.raw();
+                self._scenes.push(tlas.clone());
+            }
+        }
+        let mut scene_write = vk::WriteDescriptorSetAccelerationStructureKHR::default()
+            .acceleration_structures(&scenes);
+        let mut write = vk::WriteDescriptorSet::default()
+            .dst_set(self.raw)
+            .dst_binding(binding)
+            .descriptor_type(kind.vulkan())
+            .descriptor_count(1);
+        write = match kind {
+            BindingKind::Uniform | BindingKind::Storage => write.buffer_info(&buffers),
+            BindingKind::Texel => write.texel_buffer_view(&views),
+            BindingKind::AccelerationStructure => write.push_next(&mut scene_write),
+        };
+        // SAFETY: `check` has compared kinds, usages and devices; the set is not in use yet and
+        // its resources are kept by `self`.
+        unsafe { device.raw().update_descriptor_sets(&[write], &[]) };
+    }
+
+    fn check(&self, binding: u32, kind: BindingKind, resource: Resource<'_>) {
+        let device = &self.pipeline.0.device;
+        let (what, fits) = match resource {
+            Resource::Buffer(buffer) => {
+                let flag = match kind {
+                    BindingKind::Uniform => vk::BufferUsageFlags::UNIFORM_BUFFER,
+                    BindingKind::Storage => vk::BufferUsageFlags::STORAGE_BUFFER,
+                    BindingKind::Texel => vk::BufferUsageFlags::UNIFORM_TEXEL_BUFFER,
+                    BindingKind::AccelerationStructure => vk::BufferUsageFlags::empty(),
+                };
+                let fits = !flag.is_empty() && buffer.usage().allows(flag);
+                (buffer.name(), fits && buffer.is_of(device))
+            }
+            Resource::Acceleration(tlas) => (
+                tlas.name(),
+                kind == BindingKind::AccelerationStructure && tlas.is_of(device),
+            ),
+        };
+        assert!(
+            fits,
+            "\"{}\": binding {binding} is {kind:?}, \"{what}\" does not allow that",
+            self.name
+        );
+    }
+}
