@@ -1,1 +1,376 @@
-//! Placeholder.
+//! The film: sums over samples that have the same bits however a render was
+//! split into passes, shards and runs.
+//!
+//! Floating-point sums depend on their order, so the order is part of the
+//! definition: samples are the leaves of a binary tree over their global
+//! indices. The node (level k, first = m·2^k) covers the samples
+//! first … first + 2^k − 1. A film holds the topmost nodes that are complete;
+//! two siblings become their parent as soon as both are there. Which nodes are
+//! left, and their bits, depend only on the set of samples. Rounding errors grow
+//! with log N instead of N.
+//!
+//! References: \[Chan83\] Chan, Golub, LeVeque: Algorithms for Computing the
+//! Sample Variance, The American Statistician 37 (1983).
+
+use std::collections::BTreeMap;
+use std::ops::Range;
+
+use crate::error::{Error, Result};
+use crate::layout::{FILM_FLOATS, FILM_FLOATS_AOV};
+use crate::settings::Crop;
+
+/// One past the largest sample index, so that ends and node sizes fit 64 bits.
+pub const MAX_SAMPLES: u64 = 1 << 63;
+
+// Floats of a pixel in a node, in order.
+const RADIANCE: usize = 0;
+const DEVIATIONS: usize = 3;
+const ALBEDO: usize = 6;
+const NORMAL: usize = 9;
+const DEPTH: usize = 12;
+const COVERAGE: usize = 13;
+
+/// A complete node of the tree over sample indices.
+struct Node {
+    level: u32,
+    values: Vec<f32>,
+}
+
+/// What has been rendered of an image: see the module's documentation.
+pub struct Film {
+    window: Crop,
+    full: (u32, u32),
+    aovs: bool,
+    /// By first sample; disjoint, and no two siblings of the same level.
+    nodes: BTreeMap<u64, Node>,
+}
+
+/// The fewest aligned nodes (first, level) that make up a range of samples, in order.
+pub fn dyadic_pieces(samples: Range<u64>) -> Vec<(u64, u32)> {
+    let mut pieces = Vec::new();
+    let mut first = samples.start;
+    while first < samples.end {
+        let level = first.trailing_zeros().min((samples.end - first).ilog2());
+        pieces.push((first, level));
+        first += 1 << level;
+    }
+    pieces
+}
+
+impl Film {
+    /// An empty film for the pixels `window` of a frame of `full` = (width, height)
+    /// pixels; `aovs` says whether nodes carry the sums of the first hit.
+    pub fn new(window: Crop, full: (u32, u32), aovs: bool) -> Self {
+        Self {
+            window,
+            full,
+            aovs,
+            nodes: BTreeMap::new(),
+        }
+    }
+
+    /// The pixels that the film holds.
+    pub fn window(&self) -> Crop {
+        self.window
+    }
+
+    /// Width and height of the full frame, pixels.
+    pub fn full_size(&self) -> (u32, u32) {
+        self.full
+    }
+
+    /// Whether albedo, normal, depth and coverage are averaged too.
+    pub fn has_aovs(&self) -> bool {
+        self.aovs
+    }
+
+    /// Number of pixels in the window.
+    pub fn pixels(&self) -> usize {
+        let Crop { x0, y0, x1, y1 } = self.window;
+        (x1 - x0) as usize * (y1 - y0) as usize
+    }
+
+    /// Floats that a node holds for each pixel.
+    pub fn floats_per_pixel(&self) -> usize {
+        if self.aovs {
+            FILM_FLOATS_AOV as usize
+        } else {
+            FILM_FLOATS as usize
+        }
+    }
+
+    /// Bytes held on the host.
+    pub fn bytes(&self) -> u64 {
+        self.nodes
+            .values()
+            .map(|node| size_of_val(&node.values[..]) as u64)
+            .sum()
+    }
+
+    /// Number of samples for each pixel.
+    pub fn samples(&self) -> u64 {
+        self.nodes.values().map(|node| 1 << node.level).sum()
+    }
+
+    /// The samples that are in the film: disjoint, in order, as few ranges as possible.
+    pub fn ranges(&self) -> Vec<Range<u64>> {
+        let mut ranges: Vec<Range<u64>> = Vec::new();
+        for (&first, node) in &self.nodes {
+            let end = first + (1 << node.level);
+            match ranges.last_mut() {
+                Some(last) if last.end == first => last.end = end,
+                _ => ranges.push(first..end),
+            }
+        }
+        ranges
+    }
+
+    /// The nodes (first sample, level, values) in sample order: everything that
+    /// [`Film::add`] needs to build this film again.
+    pub fn nodes(&self) -> impl Iterator<Item = (u64, u32, &[f32])> {
+        self.nodes
+            .iter()
+            .map(|(&first, node)| (first, node.level, &node.values[..]))
+    }
+
+    /// Adds the samples first … first + 2^level − 1. `values` holds, for each pixel
+    /// of the window row by row, the sum of radiance (3), the sum of squared
+    /// deviations from the node's own mean (3) and, with AOVs, the sums of albedo
+    /// (3), normal (3), depth (1) and coverage (1).
+    ///
+    /// # Errors
+    /// [`Error::Settings`] when the node is not aligned, has the wrong size, or
+    /// holds samples that the film already has; the film is then unchanged.
+    pub fn add(&mut self, first: u64, level: u32, values: Vec<f32>) -> Result<()> {
+        self.check(first, level, values.len())?;
+        self.insert(first, level, values);
+        Ok(())
+    }
+
+    /// Adds all samples of another film of the same pixels.
+    ///
+    /// # Errors
+    /// [`Error::Settings`] when windows, frames or AOVs differ or when both hold
+    /// the same sample; the film is then unchanged.
+    pub fn merge(&mut self, other: Self) -> Result<()> {
+        if self.window != other.window {
+            let what = format!("cannot merge {:?} into {:?}", other.window, self.window);
+            return settings_error("--crop", what);
+        }
+        if self.full != other.full {
+            let what = format!("cannot merge {:?} into {:?} pixels", other.full, self.full);
+            return settings_error("--width, --height", what);
+        }
+        if self.aovs != other.aovs {
+            let what = String::from("only one of the films has sums of the first hit");
+            return settings_error("--aov", what);
+        }
+        for (&first, node) in &other.nodes {
+            self.check(first, node.level, node.values.len())?;
+        }
+        for (first, node) in other.nodes {
+            self.insert(first, node.level, node.values);
+        }
+        Ok(())
+    }
+
+    /// Mean radiance, cd/m² per channel, for each pixel row by row: node sums added
+    /// in double precision in sample order, divided, rounded once. Black when empty.
+    pub fn mean(&self) -> Vec<[f32; 3]> {
+        self.averages(RADIANCE)
+    }
+
+    /// Estimated standard error of [`Film::mean`], cd/m² per channel, taking the
+    /// samples as independent: √(M₂ / (N (N − 1))). Where samples are stratified
+    /// the true error is smaller. With fewer than two samples nothing is known
+    /// about the error, and it is +∞.
+    pub fn standard_error(&self) -> Vec<[f32; 3]> {
+        (0..self.pixels())
+            .map(|pixel| self.moments(pixel).1.map(|e| e as f32))
+            .collect()
+    }
+
+    /// Estimated relative error of the image: the root mean square of the standard
+    /// error over that of the mean, over all pixels and channels of the window.
+    /// 0 for an image without noise (a black one, too), +∞ below two samples.
+    pub fn relative_error(&self) -> f64 {
+        let (mut signal, mut noise) = (0.0, 0.0);
+        for pixel in 0..self.pixels() {
+            let (mean, error) = self.moments(pixel);
+            for channel in 0..3 {
+                signal += mean[channel] * mean[channel];
+                noise += error[channel] * error[channel];
+            }
+        }
+        if noise == 0.0 {
+            0.0
+        } else if noise.is_infinite() {
+            f64::INFINITY
+        } else {
+            (noise / signal).sqrt()
+        }
+    }
+
+    /// Mean albedo of the first hit for each pixel (0 where nothing was hit); `None` without AOVs.
+    pub fn albedo(&self) -> Option<Vec<[f32; 3]>> {
+        self.aovs.then(|| self.averages(ALBEDO))
+    }
+
+    /// Mean shading normal of the first hit in world space for each pixel, shorter
+    /// than 1 where samples differ or miss; `None` without AOVs.
+    pub fn normal(&self) -> Option<Vec<[f32; 3]>> {
+        self.aovs.then(|| self.averages(NORMAL))
+    }
+
+    /// Mean depth of the first hit in metres, over the samples that hit something;
+    /// +∞ where none did; `None` without AOVs.
+    pub fn depth(&self) -> Option<Vec<f32>> {
+        self.aovs.then(|| {
+            self.map_pixels(|pixel| {
+                let [depth, coverage] = self.sum(pixel, DEPTH);
+                if coverage > 0.0 {
+                    (depth / coverage) as f32
+                } else {
+                    f32::INFINITY
+                }
+            })
+        })
+    }
+
+    /// Fraction of samples that hit something, for each pixel; `None` without AOVs.
+    pub fn coverage(&self) -> Option<Vec<f32>> {
+        let count = self.samples().max(1) as f64;
+        self.aovs.then(|| {
+            self.map_pixels(|pixel| {
+                let [coverage] = self.sum(pixel, COVERAGE);
+                (coverage / count) as f32
+            })
+        })
+    }
+
+    /// Refuses nodes that do not fit the tree, the window or the samples that are there.
+    fn check(&self, first: u64, level: u32, len: usize) -> Result<()> {
+        let aligned = level < 64 && first % (1 << level) == 0;
+        let end = if aligned {
+            first.checked_add(1 << level)
+        } else {
+            None
+        };
+        let Some(end) = end.filter(|&end| end <= MAX_SAMPLES) else {
+            let what = format!("no node of level {level} starts at sample {first}");
+            return settings_error("--samples", what);
+        };
+        let expected = self.pixels() * self.floats_per_pixel();
+        if len != expected {
+            let what = format!("a node of this film holds {expected} floats, not {len}");
+            return settings_error("--samples", what);
+        }
+        let before = self.nodes.range(..end).next_back();
+        if let Some((&start, node)) = before {
+            let stop = start + (1 << node.level);
+            if stop > first {
+                let what =
+                    format!("samples {first}..{end} overlap {start}..{stop}, which are there");
+                return settings_error("--samples", what);
+            }
+        }
+        Ok(())
+    }
+
+    /// Inserts a checked node and merges siblings upwards.
+    fn insert(&mut self, mut first: u64, mut level: u32, mut values: Vec<f32>) {
+        let stride = self.floats_per_pixel();
+        loop {
+            let sibling = first ^ (1 << level);
+            if self.nodes.get(&sibling).is_none_or(|n| n.level != level) {
+                break;
+            }
+            let other = self.nodes.remove(&sibling).expect("was just found").values;
+            let right;
+            (values, right) = if sibling < first {
+                (other, values)
+            } else {
+                (values, other)
+            };
+            merge_siblings(&mut values, &right, level, stride);
+            first = first.min(sibling);
+            level += 1;
+        }
+        self.nodes.insert(first, Node { level, values });
+    }
+
+    /// Sums of `N` neighbouring floats of a pixel over all nodes, in sample order.
+    fn sum<const N: usize>(&self, pixel: usize, offset: usize) -> [f64; N] {
+        let start = pixel * self.floats_per_pixel() + offset;
+        let mut sum = [0.0; N];
+        for node in self.nodes.values() {
+            for (s, &v) in sum.iter_mut().zip(&node.values[start..start + N]) {
+                *s += f64::from(v);
+            }
+        }
+        sum
+    }
+
+    fn map_pixels<T>(&self, f: impl Fn(usize) -> T) -> Vec<T> {
+        (0..self.pixels()).map(f).collect()
+    }
+
+    fn averages(&self, offset: usize) -> Vec<[f32; 3]> {
+        let count = self.samples().max(1) as f64;
+        self.map_pixels(|pixel| self.sum(pixel, offset).map(|s: f64| (s / count) as f32))
+    }
+
+    /// Mean and standard error of a pixel's radiance.
+    fn moments(&self, pixel: usize) -> ([f64; 3], [f64; 3]) {
+        let start = pixel * self.floats_per_pixel();
+        let (mut n, mut mean, mut m2) = (0.0, [0.0; 3], [0.0; 3]);
+        for node in self.nodes.values() {
+            let count = (1_u64 << node.level) as f64;
+            for channel in 0..3 {
+                let sum = f64::from(node.values[start + RADIANCE + channel]);
+                let own = f64::from(node.values[start + DEVIATIONS + channel]);
+                // [Chan83] Eq. 2.1, written with means instead of sums
+                let delta = sum / count - mean[channel];
+                m2[channel] += own + delta * delta * (n * count / (n + count));
+                mean[channel] += delta * (count / (n + count));
+            }
+            n += count;
+        }
+        let error = m2.map(|m2| {
+            if n < 2.0 {
+                f64::INFINITY
+            } else {
+                (m2 / (n - 1.0) / n).sqrt()
+            }
+        });
+        (mean, error)
+    }
+}
+
+/// Adds the right sibling to the left one, both with n = 2^level samples. The
+/// shaders do the same below the nodes that they return, in this order and
+/// without fused operations, so the bits do not depend on who merges.
+fn merge_siblings(left: &mut [f32], right: &[f32], level: u32, stride: usize) {
+    // [Chan83] Eq. 2.1 for equal counts: M₂ = M₂a + M₂b + (Σa − Σb)² / (2n).
+    // A power of two, hence exact.
+    let scale = 0.5 / (1_u64 << level) as f32;
+    for (a, b) in left
+        .chunks_exact_mut(stride)
+        .zip(right.chunks_exact(stride))
+    {
+        for channel in 0..3 {
+            let d = a[RADIANCE + channel] - b[RADIANCE + channel];
+            let between = d * d * scale;
+            let m2 = &mut a[DEVIATIONS + channel];
+            *m2 = (*m2 + b[DEVIATIONS + channel]) + between;
+            a[RADIANCE + channel] += b[RADIANCE + channel];
+        }
+        for i in ALBEDO..stride {
+            a[i] += b[i];
+        }
+    }
+}
+
+fn settings_error(name: &'static str, what: String) -> Result<()> {
+    Err(Error::Settings { name, what })
+}

@@ -1,0 +1,285 @@
+//! The film gives the same bits however a render was split, and its moments are right.
+#![allow(clippy::unwrap_used, reason = "a step that fails fails the test")]
+
+use std::ops::Range;
+
+use etendue::Error;
+use etendue::film::{Film, dyadic_pieces};
+use etendue::settings::Crop;
+
+const WINDOW: Crop = Crop {
+    x0: 3,
+    y0: 1,
+    x1: 6,
+    y1: 3,
+};
+const PIXELS: usize = 6;
+
+/// splitmix64: enough for test data, and the same on every machine.
+fn hash(mut x: u64) -> u64 {
+    x = x.wrapping_add(0x9E37_79B9_7F4A_7C15);
+    x = (x ^ (x >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
+    x = (x ^ (x >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
+    x ^ (x >> 31)
+}
+
+/// Values of very different size, so that every change of order shows.
+fn radiance(sample: u64, float: u64) -> f32 {
+    let h = hash(sample * 1000 + float);
+    let unit = (h >> 40) as f32 / (1 << 24) as f32;
+    unit * 2.0_f32.powi((h & 15) as i32 - 8)
+}
+
+fn film(aovs: bool) -> Film {
+    Film::new(WINDOW, (8, 4), aovs)
+}
+
+/// The leaf of one sample: its radiance, no deviation, its AOVs.
+fn leaf(sample: u64, aovs: bool) -> Vec<f32> {
+    let stride = if aovs { 14 } else { 6 };
+    (0..PIXELS * stride)
+        .map(|i| match i % stride {
+            3..6 => 0.0,
+            // a third of the samples miss: no depth, no coverage
+            12 | 13 if sample % 3 == 0 => 0.0,
+            13 => 1.0,
+            _ => radiance(sample, i as u64),
+        })
+        .collect()
+}
+
+fn sequential(samples: Range<u64>, aovs: bool) -> Film {
+    let mut film = film(aovs);
+    for sample in samples {
+        film.add(sample, 0, leaf(sample, aovs)).unwrap();
+    }
+    film
+}
+
+/// A node as a renderer returns it: built sample by sample in a film of its own.
+fn node(first: u64, level: u32, aovs: bool) -> Vec<f32> {
+    let own = sequential(first..first + (1 << level), aovs);
+    let nodes: Vec<_> = own.nodes().collect();
+    assert_eq!(nodes.len(), 1, "an aligned range is one node");
+    assert_eq!((nodes[0].0, nodes[0].1), (first, level));
+    nodes[0].2.to_vec()
+}
+
+/// Everything that leaves a film, as bits.
+fn bits(film: &Film) -> Vec<u32> {
+    let mut all: Vec<f32> = film.nodes().flat_map(|n| n.2.to_vec()).collect();
+    all.extend(film.mean().as_flattened());
+    all.extend(film.standard_error().as_flattened());
+    for vectors in [film.albedo(), film.normal()].into_iter().flatten() {
+        all.extend(vectors.as_flattened());
+    }
+    for values in [film.depth(), film.coverage()].into_iter().flatten() {
+        all.extend(values);
+    }
+    all.into_iter().map(f32::to_bits).collect()
+}
+
+/// Splits a range into aligned pieces, some of them further than needed, in random order.
+fn random_pieces(samples: Range<u64>, seed: u64) -> Vec<(u64, u32)> {
+    let mut pieces = Vec::new();
+    let mut open = dyadic_pieces(samples);
+    while let Some((first, level)) = open.pop() {
+        if level > 0 && hash(seed ^ hash(first * 64 + u64::from(level))) % 3 != 0 {
+            let half = 1 << (level - 1);
+            open.extend([(first, level - 1), (first + half, level - 1)]);
+        } else {
+            pieces.push((first, level));
+        }
+    }
+    pieces.sort_by_key(|&(first, _)| hash(seed.wrapping_add(first)));
+    pieces
+}
+
+#[test]
+fn any_split_in_any_order_gives_the_same_bits() {
+    for aovs in [false, true] {
+        for samples in [0..100, 3..77, 64..128, 5..6] {
+            let expected = bits(&sequential(samples.clone(), aovs));
+            for seed in 0..20 {
+                let mut film = film(aovs);
+                for (first, level) in random_pieces(samples.clone(), seed) {
+                    film.add(first, level, node(first, level, aovs)).unwrap();
+                }
+                assert_eq!(film.ranges(), [samples.clone()]);
+                assert!(bits(&film) == expected, "{samples:?}, split {seed}");
+            }
+        }
+    }
+}
+
+#[test]
+fn shards_merge_to_the_same_bits_in_every_order() {
+    let cuts = [0, 3, 17, 32, 33, 64, 90, 100];
+    let expected = bits(&sequential(0..100, true));
+    for seed in 0..10 {
+        let mut shards: Vec<_> = cuts.windows(2).map(|c| c[0]..c[1]).collect();
+        shards.sort_by_key(|shard| hash(seed * 1000 + shard.start));
+        let mut whole = film(true);
+        for shard in shards {
+            whole.merge(sequential(shard, true)).unwrap();
+        }
+        assert_eq!((whole.samples(), whole.ranges()), (100, vec![0..100]));
+        assert!(bits(&whole) == expected, "order {seed}");
+    }
+}
+
+#[test]
+fn gaps_stay_visible_and_count_only_what_is_there() {
+    let mut film = sequential(3..77, false);
+    film.merge(sequential(90..93, false)).unwrap();
+    assert_eq!(film.ranges(), [3..77, 90..93]);
+    assert_eq!(film.samples(), 77);
+    // from 3, 4, 8, 16, 32, 64, 72, 76, and from 90, 92
+    assert_eq!(film.nodes().count(), 10);
+}
+
+/// Each level of the tree doubles a constant, which is exact; so is the rest.
+#[test]
+fn a_million_equal_samples_lose_nothing() {
+    let window = Crop {
+        x0: 0,
+        y0: 0,
+        x1: 1,
+        y1: 1,
+    };
+    let mut film = Film::new(window, (1, 1), false);
+    for sample in 0..1_000_000 {
+        film.add(sample, 0, vec![0.1, 0.1, 0.1, 0.0, 0.0, 0.0])
+            .unwrap();
+    }
+    let mean = f64::from(film.mean()[0][0]);
+    assert!((mean / 0.1 - 1.0).abs() < 1e-7, "{mean}");
+    assert_eq!(film.standard_error()[0], [0.0; 3]);
+    assert_eq!(film.relative_error(), 0.0);
+    // 1 000 000 has seven ones in binary
+    assert_eq!(film.nodes().count(), 7);
+}
+
+/// Against two passes in double precision. Each of seven levels rounds to 24
+/// bits, so relative errors stay below 2 · 7 · 2⁻²⁴ < 1e-6.
+#[test]
+fn moments_agree_with_two_passes_in_double_precision() {
+    for samples in [0..100_u64, 3..77] {
+        let film = sequential(samples.clone(), false);
+        let (mean, error) = (film.mean(), film.standard_error());
+        let (mut signal, mut noise) = (0.0, 0.0);
+        for pixel in 0..PIXELS {
+            for channel in 0..3 {
+                let float = (pixel * 6 + channel) as u64;
+                let x = || samples.clone().map(|s| f64::from(radiance(s, float)));
+                let n = (samples.end - samples.start) as f64;
+                let expected = x().sum::<f64>() / n;
+                let m2: f64 = x().map(|x| (x - expected) * (x - expected)).sum();
+                let sigma = (m2 / (n - 1.0) / n).sqrt();
+                let relative = |value: f32, expected: f64| f64::from(value) / expected - 1.0;
+                assert!(relative(mean[pixel][channel], expected).abs() < 1e-6);
+                assert!(relative(error[pixel][channel], sigma).abs() < 1e-6);
+                signal += expected * expected;
+                noise += sigma * sigma;
+            }
+        }
+        let expected = (noise / signal).sqrt();
+        assert!((film.relative_error() / expected - 1.0).abs() < 1e-6);
+    }
+}
+
+/// The reason for M₂: a sum of squares in single precision would lose the whole variance here.
+#[test]
+fn small_deviations_on_a_large_mean_survive() {
+    let mut film = film(false);
+    for sample in 0..64 {
+        let mut values = leaf(sample, false);
+        // 1000 and 1000.125 in turn: these and their sums are exact
+        for pixel in values.chunks_exact_mut(6) {
+            pixel[..3].fill(1000.0 + 0.125 * (sample % 2) as f32);
+        }
+        film.add(sample, 0, values).unwrap();
+    }
+    let expected = (0.0625_f64.powi(2) * 64.0 / 63.0 / 64.0).sqrt() as f32;
+    assert_eq!(film.standard_error()[0][0], expected);
+}
+
+#[test]
+fn depth_averages_hits_and_misses_are_infinitely_far() {
+    let mut film = film(true);
+    for (sample, depth) in [2.0, 4.0, 0.0, 0.0].into_iter().enumerate() {
+        let mut values = vec![0.0; PIXELS * 14];
+        if depth > 0.0 {
+            // only the first pixel is ever hit
+            values[6..9].copy_from_slice(&[0.5, 0.25, 1.0]);
+            values[9..12].copy_from_slice(&[0.0, 1.0, 0.0]);
+            values[12..14].copy_from_slice(&[depth, 1.0]);
+        }
+        film.add(sample as u64, 0, values).unwrap();
+    }
+    let (depth, coverage) = (film.depth().unwrap(), film.coverage().unwrap());
+    assert_eq!((depth[0], coverage[0]), (3.0, 0.5));
+    assert_eq!((depth[1], coverage[1]), (f32::INFINITY, 0.0));
+    assert_eq!(film.albedo().unwrap()[0], [0.25, 0.125, 0.5]);
+    assert_eq!(film.normal().unwrap()[0], [0.0, 0.5, 0.0]);
+    let plain = sequential(0..4, false);
+    assert!(plain.albedo().is_none() && plain.depth().is_none());
+}
+
+#[test]
+fn one_sample_says_nothing_about_the_error() {
+    let film = sequential(7..8, false);
+    assert_eq!(film.standard_error()[0], [f32::INFINITY; 3]);
+    assert_eq!(film.relative_error(), f64::INFINITY);
+    assert!(film.mean()[0][0] > 0.0);
+}
+
+#[test]
+fn what_does_not_fit_is_refused_and_changes_nothing() {
+    let mut whole = sequential(8..24, false);
+    let before = bits(&whole);
+    let mut refused = |first: u64, level: u32, len: usize| {
+        let result = whole.add(first, level, vec![0.0; len]);
+        assert!(
+            matches!(result, Err(Error::Settings { .. })),
+            "node {first}, {level} of {len} floats"
+        );
+    };
+    let len = PIXELS * 6;
+    refused(8, 0, len);
+    refused(23, 0, len);
+    refused(16, 3, len);
+    refused(0, 5, len); // holds all of it
+    refused(0, 4, len); // its second half overlaps
+    refused(3, 1, len); // not aligned
+    refused(24, 0, len - 1);
+    refused(0, 64, len);
+    refused(1 << 63, 0, len);
+
+    // the second node of this film collides; the first must not be left behind
+    let mut other = sequential(0..1, false);
+    other.merge(sequential(10..11, false)).unwrap();
+    assert!(whole.merge(other).is_err());
+    assert!(whole.merge(sequential(100..101, true)).is_err());
+    assert!(whole.merge(Film::new(WINDOW, (8, 5), false)).is_err());
+    let moved = Crop { x0: 2, ..WINDOW };
+    assert!(whole.merge(Film::new(moved, (8, 4), false)).is_err());
+    assert!(bits(&whole) == before);
+    assert_eq!(whole.ranges(), [8..24]);
+}
+
+#[test]
+fn pieces_are_aligned_and_make_up_the_range() {
+    let far = 1 << 62;
+    for range in [0..1, 0..100, 3..77, 1..1 << 40, far - 3..far, 9..9] {
+        let pieces = dyadic_pieces(range.clone());
+        let mut next = range.start;
+        for &(first, level) in &pieces {
+            assert_eq!(first, next);
+            assert_eq!(first % (1 << level), 0);
+            next += 1 << level;
+        }
+        assert_eq!(next, range.end);
+        assert!(pieces.len() <= 2 * 62);
+    }
+}
