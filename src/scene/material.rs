@@ -85,3 +85,19 @@ impl Default for Material {
         }
     }
 }
+
+impl Material {
+    /// Every texture that the material uses.
+    pub fn textures(&self) -> impl Iterator<Item = TextureRef> {
+        [
+            self.base_color_texture,
+            self.metallic_roughness_texture,
+            self.normal_texture,
+            self.emission_texture,
+            self.specular_texture,
+            self.specular_color_texture,
+        ]
+        .into_iter()
+        .flatten()
+    }
+}

@@ -6,7 +6,7 @@
 //! moved back to it (see `render::upload`).
 
 mod camera;
-mod environment;
+pub(crate) mod environment;
 pub mod gltf;
 mod light;
 mod material;
@@ -16,7 +16,7 @@ mod texture;
 use glam::{DAffine3, DVec3};
 
 pub use camera::{Camera, Projection};
-pub use environment::Environment;
+pub use environment::{Environment, LoadedEnvironment, load_environment};
 pub use light::{LightKind, PunctualLight};
 pub use material::{AlphaMode, Material};
 pub use mesh::Mesh;
@@ -63,6 +63,13 @@ impl Scene {
             .iter()
             .map(|i| self.meshes[i.mesh as usize].triangles.len() as u64)
             .sum()
+    }
+
+    /// The camera for scenes that have none: sees all of [`Self::bounds`], see
+    /// [`Camera::framing`]. `aspect` is width over height of the picture.
+    pub fn framing_camera(&self, aspect: f64) -> Camera {
+        let (low, high) = self.bounds().unwrap_or_default();
+        Camera::framing(low, high, aspect)
     }
 
     /// World-space bounding box of all instances, metres; `None` when empty.

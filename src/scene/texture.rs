@@ -1,7 +1,7 @@
 //! Decoded images and how they are looked up.
 
 /// What happens to coordinates outside 0 … 1.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum Wrap {
     /// Tile.
     #[default]
@@ -14,7 +14,7 @@ pub enum Wrap {
 
 /// Reconstruction between texels; glTF's minification filters are not used,
 /// since many samples a pixel integrate the footprint without bias.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum Filter {
     /// The texel that holds the point.
     Nearest,

@@ -1,0 +1,113 @@
+//! PNG and JPEG → texels. The header is read first, so that an image that
+//! claims too much is refused before any memory is taken for it.
+
+use std::io::Cursor;
+
+use image::{DynamicImage, ImageFormat, ImageReader};
+
+use super::texture::ColorSpace;
+use super::{Check, quote};
+use crate::scene::Texels;
+
+/// A decoded image.
+pub(super) struct Decoded {
+    pub width: u32,
+    pub height: u32,
+    pub texels: Texels,
+}
+
+/// Decodes an image. `texels` is (what is left of the limit, the limit).
+pub(super) fn decode(
+    bytes: &[u8],
+    mime_type: Option<&str>,
+    longest_side: u32,
+    texels: (u64, u64),
+    color_space: ColorSpace,
+) -> Check<Decoded> {
+    if let Some(mime) = mime_type.filter(|m| !matches!(*m, "image/png" | "image/jpeg")) {
+        return Err(format!(
+            "{} is not supported, only PNG and JPEG are",
+            quote(mime)
+        ));
+    }
+    let format = match image::guess_format(bytes) {
+        Ok(format @ (ImageFormat::Png | ImageFormat::Jpeg)) => format,
+        _ => return Err(String::from("is neither a PNG nor a JPEG image")),
+    };
+    let broken = |error: image::ImageError| format!("cannot be decoded: {error}");
+    let (width, height) = ImageReader::with_format(Cursor::new(bytes), format)
+        .into_dimensions()
+        .map_err(broken)?;
+    check_size(width, height, longest_side)?;
+    let size = u64::from(width) * u64::from(height);
+    check_total(size, texels.0, texels.1)?;
+
+    // The decoder's own allocations, for bombs in other places than the pixels:
+    // sixteen-bit RGBA twice over, and a fixed sum for tables and metadata.
+    const DECODER_OVERHEAD: u64 = 1 << 26;
+    let mut limits = image::Limits::default();
+    limits.max_alloc = Some(size * 16 + DECODER_OVERHEAD);
+    let mut reader = ImageReader::with_format(Cursor::new(bytes), format);
+    reader.limits(limits);
+    let decoded = reader.decode().map_err(broken)?;
+    Ok(Decoded {
+        width,
+        height,
+        texels: to_texels(decoded, color_space),
+    })
+}
+
+/// Refuses images without pixels or with sides beyond the limit.
+pub(super) fn check_size(width: u32, height: u32, longest_side: u32) -> Check<()> {
+    if width == 0 || height == 0 {
+        return Err(format!("is {width} × {height} pixels: empty"));
+    }
+    if width > longest_side || height > longest_side {
+        return Err(format!(
+            "is {width} × {height} pixels, larger than the cap of {longest_side} × {longest_side} (Limits::image_side)"
+        ));
+    }
+    Ok(())
+}
+
+/// Refuses an image that would take all of them beyond the limit.
+pub(super) fn check_total(size: u64, left: u64, cap: u64) -> Check<()> {
+    if size > left {
+        return Err(format!(
+            "its {size} texels take the scene beyond the cap of {cap} texels in total (Limits::texels)"
+        ));
+    }
+    Ok(())
+}
+
+fn to_texels(image: DynamicImage, color_space: ColorSpace) -> Texels {
+    use DynamicImage::{ImageLuma16, ImageLumaA16, ImageRgb16, ImageRgba16};
+    match image {
+        ImageLuma16(_) | ImageLumaA16(_) | ImageRgb16(_) | ImageRgba16(_) => {
+            let mut data = image.into_rgba16().into_raw();
+            if color_space == ColorSpace::Srgb {
+                for texel in data.chunks_exact_mut(4) {
+                    for channel in &mut texel[..3] {
+                        *channel = linear_from_srgb(*channel);
+                    }
+                }
+            }
+            Texels::Rgba16(data)
+        }
+        _ => Texels::Rgba8 {
+            data: image.into_rgba8().into_raw(),
+            srgb: color_space == ColorSpace::Srgb,
+        },
+    }
+}
+
+/// The curve of IEC 61966-2-1 on sixteen bits.
+fn linear_from_srgb(encoded: u16) -> u16 {
+    let x = f64::from(encoded) / 65535.0;
+    let linear = if x <= 0.04045 {
+        x / 12.92
+    } else {
+        ((x + 0.055) / 1.055).powf(2.4)
+    };
+    (linear * 65535.0).round() as u16
+}
