@@ -39,11 +39,16 @@ fn buffers_hold_what_was_written() {
             .unwrap();
         assert_eq!(buffer.read::<f32>(3).unwrap(), [0.0; 3]);
     }
+    // What lies behind the data is zero even where the memory was used before.
+    let dirt = Buffer::from_slice(&device, "dirt", Usage::STORAGE, &[0xFFu8; 1024]).unwrap();
+    drop(dirt);
+    let odd = Buffer::from_slice(&device, "odd", Usage::STORAGE, &[7u8; 13]).unwrap();
+    assert_eq!(odd.read::<u8>(16).unwrap()[12..], [7, 0, 0, 0]);
     let empty = Buffer::from_slice::<f32>(&device, "empty", Usage::STORAGE, &[]).unwrap();
     assert_eq!(empty.bytes(), 16);
     assert_eq!(empty.read::<u32>(4).unwrap(), [0; 4]);
 
-    drop((large, empty));
+    drop((large, odd, empty));
     finish(device);
 }
 

@@ -125,8 +125,12 @@ fn rays_meet_placed_triangles() {
     };
     let scene = Tlas::build(&device, "scene", &[place(IDENTITY), place(TURNED)]).unwrap();
     assert!(scene.bytes() > 0);
-    // The scene keeps its groups.
+    // The scene keeps its groups: were their memory free, these buffers would overwrite it.
     drop(blas);
+    let zeros = [0u8; 4096];
+    let overwrite: Vec<_> = (0..64)
+        .map(|_| Buffer::from_slice(&device, "overwrite", Usage::TRANSFER, &zeros).unwrap())
+        .collect();
     let down = [0.0, 0.0, -1.0];
     let up = [0.0, 0.0, 1.0];
     let rays = [
@@ -154,7 +158,7 @@ fn rays_meet_placed_triangles() {
     assert_hit(&hits[6], 4.0, [0.25, 0.5], 0, 1);
     assert_miss(&hits[7]);
     assert_miss(&hits[8]);
-    drop(scene);
+    drop((scene, overwrite));
     finish(device);
 }
 
