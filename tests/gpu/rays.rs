@@ -126,8 +126,8 @@ fn rays_meet_placed_triangles() {
     let scene = Tlas::build(&device, "scene", &[place(IDENTITY), place(TURNED)]).unwrap();
     assert!(scene.bytes() > 0);
     // The scene keeps its groups: were their memory free, these buffers would overwrite it.
+    let zeros = vec![0u8; blas.bytes() as usize];
     drop(blas);
-    let zeros = [0u8; 4096];
     let overwrite: Vec<_> = (0..64)
         .map(|_| Buffer::from_slice(&device, "overwrite", Usage::TRANSFER, &zeros).unwrap())
         .collect();
