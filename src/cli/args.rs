@@ -50,11 +50,11 @@ pub struct RenderArgs {
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=MAX_SAMPLES))]
     pub spp: Option<u64>,
     /// Seconds of rendering at most; at least one pass is rendered
-    #[arg(long, value_name = "SECONDS", value_parser = positive)]
+    #[arg(long, value_name = "SECONDS", allow_negative_numbers = true, value_parser = positive)]
     pub time: Option<f64>,
     /// Stop when the standard error is at most X of the signal, both as root mean
     /// squares over the image; tested from 16 samples on
-    #[arg(long, value_name = "X", value_parser = positive)]
+    #[arg(long, value_name = "X", allow_negative_numbers = true, value_parser = positive)]
     pub noise: Option<f64>,
     /// Seed of the random numbers
     #[arg(long, value_name = "N", default_value_t = 0)]
@@ -80,7 +80,7 @@ pub struct RenderArgs {
     #[arg(long, value_name = "FILE")]
     pub env: Option<PathBuf>,
     /// Factor on the image's values
-    #[arg(long, value_name = "X", requires = "env", default_value_t = 1.0, value_parser = not_negative)]
+    #[arg(long, value_name = "X", requires = "env", default_value_t = 1.0, allow_negative_numbers = true, value_parser = not_negative)]
     pub env_intensity: f64,
     /// Rotation of the image about +Y, right-handed
     #[arg(long, value_name = "DEGREES", requires = "env", default_value_t = 0.0,
@@ -150,7 +150,7 @@ pub enum Backend {
     Auto,
     /// The device's ray query (VK_KHR_ray_query)
     RayQuery,
-    /// Own bounding volume hierarchy in compute; runs on every Vulkan 1.2 device
+    /// Own bounding volume hierarchy in a compute shader; needs no ray tracing hardware
     Bvh,
 }
 

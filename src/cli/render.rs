@@ -1,16 +1,14 @@
 //! `etendue render`: arguments → settings → library → files.
 
-use std::fs;
 use std::path::Path;
 use std::time::Instant;
 
 use etendue::film::Film;
 use etendue::image_io::{Aov, Format, Image, probe_writable, write_bytes, write_exr, write_png};
 use etendue::render::{Control, DeviceOptions, Progress, Renderer};
-use etendue::scene::{Camera, Environment, Projection, Scene, gltf};
+use etendue::scene::{Camera, Environment, Projection, Scene, gltf, load_environment};
 use etendue::settings::Settings;
 use etendue::{Error, Result};
-use sha2::{Digest, Sha256};
 
 use super::args::RenderArgs;
 use super::failure::{Failure, Outcome};
@@ -102,19 +100,20 @@ fn load(args: &RenderArgs) -> Result<(Scene, Option<String>), Failure> {
     let Some(path) = &args.env else {
         return Ok((scene, None));
     };
-    let (intensity, rotation) = (args.env_intensity, args.env_rotation.to_radians());
-    let environment = Environment::load(path, intensity as f32, rotation as f32);
-    scene.environment = Some(environment.map_err(Failure::scene)?);
-    let bytes = fs::read(path).map_err(|source| {
-        Failure::scene(Error::Io {
-            action: "read",
-            path: path.clone(),
-            source,
-        })
-    })?;
-    let hash = Sha256::digest(&bytes);
-    let hash = hash.iter().map(|byte| format!("{byte:02x}")).collect();
-    Ok((scene, Some(hash)))
+    let loaded = load_environment(path).map_err(Failure::scene)?;
+    let mut environment = loaded.environment;
+    if let Environment::Map {
+        intensity,
+        rotation,
+        ..
+    } = &mut environment
+    {
+        *intensity = args.env_intensity as f32;
+        *rotation = args.env_rotation.to_radians() as f32;
+    }
+    scene.environment = Some(environment);
+    scene.warnings.extend(loaded.warnings);
+    Ok((scene, Some(loaded.hash)))
 }
 
 /// What the arguments mean for this scene.
