@@ -171,7 +171,7 @@ fn scene() -> TempDir {
     let scene = json!({
         "asset": { "version": "2.0" },
         "scene": 0,
-        "extensionsUsed": ["ETENDUE_environment"],
+        "extensionsUsed": ["ETENDUE_environment", "VENDOR_unknown"],
         "scenes": [{
             "nodes": [0, 1, 2],
             "extensions": { "ETENDUE_environment": { "radiance": SKY } }
@@ -244,7 +244,11 @@ fn a_render_writes_every_output_with_its_header() {
     let output = render(&folder, options);
     assert_eq!(list(folder.path()), ["a.exr", "a.png", "scene.gltf"]);
     // piped, progress is plain lines
-    assert!(!stderr(&output).contains('\r') && !stderr(&output).contains('\u{1b}'));
+    let messages = stderr(&output);
+    assert!(!messages.contains('\r') && !messages.contains('\u{1b}'));
+    assert!(messages.contains("16/16 samples (100 %)"), "{messages}");
+    // what the file asks for and does not get is said once
+    assert_eq!(messages.matches("VENDOR_unknown").count(), 1, "{messages}");
 
     let image = read(&folder, "a.exr");
     assert_eq!((image.full, image.size()), ((32, 16), (32, 16)));

@@ -10,13 +10,13 @@ mod progress;
 mod render;
 mod stats;
 
-use std::io::{self, Write};
+use std::io::{self, IsTerminal, Write};
 use std::process::ExitCode;
 
 use clap::Parser;
 use tracing_subscriber::EnvFilter;
 
-use self::args::{Arguments, Command};
+use self::args::{Arguments, Command, ProgressName};
 use self::failure::{Failure, Outcome};
 
 /// The whole program.
@@ -24,7 +24,9 @@ pub fn main() -> ExitCode {
     failure::report_panics_as_errors();
     let outcome = match Arguments::parse().command {
         Command::Render(args) => {
-            log_to_stderr(args.quiet, args.verbose);
+            // lines of text would get between the JSON objects
+            let quiet = args.quiet || args.progress == ProgressName::Json;
+            log_to_stderr(quiet, args.verbose);
             render::run(&args)
         }
         Command::Info(args) => {
@@ -44,16 +46,18 @@ pub fn main() -> ExitCode {
 
 /// Sends the library's log to stderr; `RUST_LOG` has the last word on what is shown.
 fn log_to_stderr(quiet: bool, verbose: u8) {
+    // what the loader warns of also stands in the scene, and is shown from there
     let level = match (quiet, verbose) {
         (true, _) => "error",
-        (_, 0) => "warn",
-        (_, 1) => "info",
+        (_, 0) => "warn,etendue::scene=error",
+        (_, 1) => "info,etendue::scene=error",
         _ => "debug",
     };
     let filter = EnvFilter::try_from_default_env().unwrap_or_else(|_| EnvFilter::new(level));
     tracing_subscriber::fmt()
         .with_env_filter(filter)
         .with_writer(io::stderr)
+        .with_ansi(io::stderr().is_terminal() && std::env::var_os("NO_COLOR").is_none())
         .without_time()
         .with_target(false)
         .init();

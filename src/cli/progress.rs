@@ -171,10 +171,11 @@ impl Status {
     fn text(&self) -> String {
         let left = self.left.map_or_else(|| String::from("?"), duration);
         format!(
-            "{}/{} samples ({:.0} %), {:.3} samples/s, {left} left",
+            "{}/{} samples ({:.0} %), {:.*} samples/s, {left} left",
             self.done,
             self.total,
             self.fraction * 100.0,
+            if self.rate < 10.0 { 2 } else { 0 },
             self.rate
         )
     }

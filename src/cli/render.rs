@@ -316,7 +316,9 @@ fn finish(record: &Record, reporter: &Reporter, start: Instant) -> Result<(), Fa
         write: writing.elapsed().as_secs_f64(),
         total: start.elapsed().as_secs_f64(),
     };
-    tracing::info!("wrote {} files in {:.3} s", written.len(), late.write);
+    for path in &written {
+        tracing::info!("wrote {}", path.display());
+    }
     if let Some(path) = &record.args.stats {
         let text = format!("{:#}\n", stats::statistics(record, &late));
         if let Err(error) = write_bytes(path, text.as_bytes()) {
