@@ -287,7 +287,8 @@ pub fn closest_exhaustive(bvh: &Bvh, ray: &Ray, is_opaque: IsOpaque) -> (Option<
         let linear = |v: DVec3| m[0] * v.x + m[1] * v.y + m[2] * v.z;
         let origin = linear(ray.origin.as_dvec3()) + m[3];
         let direction = linear(ray.direction.as_dvec3());
-        let records = &bvh.triangles[group.first_triangle as usize..][..group.triangle_count as usize];
+        let records =
+            &bvh.triangles[group.first_triangle as usize..][..group.triangle_count as usize];
         for record in records {
             let Some((t, bary)) = intersect_double(record, origin, direction) else {
                 continue;
