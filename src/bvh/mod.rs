@@ -1,5 +1,5 @@
 //! The project's own bounding volume hierarchy: an eight-wide tree with
-//! quantised child boxes (CWBVH, [Ylitie17]), built by the obvhs crate, read by
+//! quantised child boxes (CWBVH, \[Ylitie17\]), built by the obvhs crate, read by
 //! `shaders/traverse_software.glsl` and, as the oracle of the tests, by
 //! [`traverse`].
 //!
@@ -35,7 +35,7 @@
 //!
 //! # References
 //!
-//! [Ylitie17] Ylitie, Karras, Laine: Efficient incoherent ray traversal on GPUs
+//! \[Ylitie17\] Ylitie, Karras, Laine: Efficient incoherent ray traversal on GPUs
 //! through compressed wide BVHs. High-Performance Graphics 2017.
 
 mod build;

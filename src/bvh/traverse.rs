@@ -4,7 +4,7 @@
 //!
 //! # References
 //!
-//! [Woop13] Woop, Benthin, Wald: Watertight ray/triangle intersection. Journal of
+//! \[Woop13\] Woop, Benthin, Wald: Watertight ray/triangle intersection. Journal of
 //! Computer Graphics Techniques 2(1), 2013.
 
 use glam::{DVec3, Vec3};
