@@ -5,6 +5,7 @@
     clippy::unwrap_used,
     reason = "the lint's exception for tests does not reach their helpers"
 )]
+#![allow(clippy::print_stdout, reason = "a skipped test says why")]
 
 #[path = "layout/specialisation.rs"]
 mod specialisation;
