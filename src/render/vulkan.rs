@@ -18,8 +18,8 @@ use crate::layout::{self, ProbeHit, ProbeRay};
 use crate::settings::BackendChoice;
 use crate::spec;
 
-const NODE_FORMAT: TexelFormat = TexelFormat::Rgba32Uint;
-const RECORD_FORMAT: TexelFormat = TexelFormat::Rgba32Float;
+/// Records that mix integers and floats are read as integers, whose bits no device changes.
+const RECORDS: TexelFormat = TexelFormat::Rgba32Uint;
 /// Invocations of a probe's work group.
 const PROBE_GROUP: u32 = 64;
 
@@ -246,8 +246,8 @@ impl VulkanBackend {
             ),
             (
                 layout::BIND_MATERIALS,
-                storage,
-                upload(device, "materials", &data.materials)?,
+                BindingKind::Texel,
+                texel(device, "materials", RECORDS, &data.materials, false)?,
             ),
             (
                 layout::BIND_TEXTURE_USES,
@@ -261,8 +261,8 @@ impl VulkanBackend {
             ),
             (
                 layout::BIND_LIGHTS,
-                storage,
-                upload(device, "lights", &data.lights)?,
+                BindingKind::Texel,
+                texel(device, "lights", RECORDS, &data.lights, false)?,
             ),
             (
                 layout::BIND_ENV_MAP,
@@ -533,14 +533,8 @@ fn texel<T: bytemuck::Pod>(
 
 fn upload_bvh(device: &Arc<Device>, bvh: &Bvh) -> Result<Traversal> {
     Ok(Traversal::Software {
-        nodes: texel(device, "bvh nodes", NODE_FORMAT, &bvh.nodes, false)?,
-        records: texel(
-            device,
-            "bvh triangles",
-            RECORD_FORMAT,
-            &bvh.triangles,
-            false,
-        )?,
+        nodes: texel(device, "bvh nodes", RECORDS, &bvh.nodes, false)?,
+        records: texel(device, "bvh triangles", RECORDS, &bvh.triangles, false)?,
     })
 }
 
