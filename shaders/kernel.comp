@@ -2,6 +2,7 @@
 // and the kernel, and nothing else.
 #version 460
 #extension GL_GOOGLE_include_directive : require
+#extension GL_KHR_shader_subgroup_arithmetic : require
 #ifdef TRAVERSE_QUERY
 #extension GL_EXT_ray_query : require
 #endif

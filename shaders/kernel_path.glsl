@@ -52,7 +52,6 @@ void main()
     uint truncated = 0u;
     float truncated_throughput = 0.0;
     uint non_finite = 0u;
-    uint level = 0u;
     for (uint i = 0u; i < batch.sample_count; i++) {
         // Batches are aligned, so the low word does not overflow within one.
         uvec4 key = rng_key(seed, pixel_index, batch.first_sample_low + i, batch.first_sample_high);
@@ -65,15 +64,23 @@ void main()
 
         FilmNode node = FilmNode(is_dropped ? vec3(0.0) : path.radiance, vec3(0.0), path.first.albedo, path.first.normal,
                                  path.first.depth, path.first.coverage);
-        // A binary counter: each set bit of i is a finished sibling.
-        float count = 1.0;
-        for (level = 0u; (i >> level & 1u) != 0u; level++) {
-            node = film_merge(levels[level], node, count);
-            count *= 2.0;
+        // A binary counter: each set bit of i is a finished sibling. The bounds
+        // are constant so that the levels stay in registers.
+        for (uint level = 0u; level < FILM_LEVELS; level++) {
+            if ((i >> level & 1u) == 0u) {
+                levels[level] = node;
+                break;
+            }
+            node = film_merge(levels[level], node, float(1u << level));
         }
-        levels[level] = node;
     }
-    film_write(at.y * params.window_width + at.x - batch.film_first_pixel, levels[level]);
+    FilmNode root = levels[0];
+    for (uint level = 1u; level < FILM_LEVELS; level++) {
+        if ((batch.sample_count >> level) != 0u) {
+            root = levels[level];
+        }
+    }
+    film_write(at.y * params.window_width + at.x - batch.film_first_pixel, root);
 
     if (truncated != 0u) {
         atomicAdd(ledger[LEDGER_TRUNCATED], truncated);
@@ -82,5 +89,8 @@ void main()
     if (non_finite != 0u) {
         atomicAdd(ledger[LEDGER_NON_FINITE], non_finite);
     }
-    ledger_add(LEDGER_RAYS_LOW, rays);
+    uint subgroup_rays = subgroupAdd(rays);
+    if (subgroupElect()) {
+        ledger_add(LEDGER_RAYS_LOW, subgroup_rays);
+    }
 }

@@ -93,12 +93,14 @@ const uint MATERIAL_MASK = 2u;
 const uint MATERIAL_BLEND = 4u;
 const uint MATERIAL_HAS_TEXTURES = 8u;
 const uint MATERIAL_UNLIT = 16u;
+const uint MATERIAL_EMISSIVE = 32u;     // emission_pdf > 0
 
+// Read as five texels (scene.glsl), so every fourth word starts a group.
 struct Material {
     vec3 base_color;
     uint flags;                 // MATERIAL_*
     vec3 emission;              // radiance, cd/m²
-    float emission_pdf;         // probability density of a point on it among all points of the light table, 1/m²; 0: emits nothing
+    float emission_pdf;         // probability density of a point on it among all points of the light table, 1/m²
     float alpha;
     float alpha_cutoff;
     float metallic;
@@ -107,7 +109,10 @@ struct Material {
     float specular;             // strength: scales F0 and is F90
     float normal_scale;
     uint first_texture;         // of TEXTURE_SLOTS entries in `texture_uses`; only with MATERIAL_HAS_TEXTURES
+    uint reserved_0;
+    uint reserved_1;
 };
+const uint MATERIAL_TEXELS = 5u;
 
 // Slots of a textured material, in order.
 const uint TEXTURE_BASE_COLOR = 0u;
@@ -147,20 +152,27 @@ const uint LIGHT_POINT = 1u;
 const uint LIGHT_SPOT = 2u;
 const uint LIGHT_DIRECTIONAL = 3u;
 
-// One entry of the alias table over all lights but the environment.
+// One entry of the alias table over all lights but the environment; read as six texels.
 struct Light {
     uint kind;                  // LIGHT_*
-    uint instance;              // triangle: where it is …
-    uint triangle;              // … and its index in `triangles`
     uint alias;                 // entry to take instead …
     float keep;                 // … with probability 1 − keep
     float choice;               // probability of this light, given that a light of the table is chosen
-    vec3 position;              // point, spot: metres
-    vec3 direction;             // spot, directional: where it shines to, unit
-    vec3 intensity;             // cd, or lx when directional
+    vec3 position;              // triangle: its first corner; point, spot: where it is. Metres
+    uint material;              // triangle: its material | LIGHT_* flags
+    vec3 edge1;                 // triangle: to the second corner
+    uint triangle;              // triangle: its index in `triangles`
+    vec3 edge2;                 // triangle: to the third corner
     float cos_inner;            // spot
-    float cos_outer;
+    vec3 direction;             // spot, directional: where it shines to, unit
+    float cos_outer;            // spot
+    vec3 intensity;             // cd, or lx when directional; triangle: radiance without its texture, cd/m²
+    float emission_pdf;         // triangle: as Material's
 };
+const uint LIGHT_TEXELS = 6u;
+const uint LIGHT_PLAIN = 0x80000000u;        // `intensity` is all: no texture, vertex colour or alpha enters
+const uint LIGHT_DOUBLE_SIDED = 0x40000000u; // emits from both sides
+const uint LIGHT_MIRRORED = 0x20000000u;     // the front sees its corners clockwise
 
 // Environment map texel: alias table over all texels.
 struct EnvTexel {
@@ -213,15 +225,15 @@ const uint BIND_INSTANCES = 3u;      // storage: Instance[]
 const uint BIND_TRIANGLES = 4u;      // texel buffer RGBA32UI
 const uint BIND_VERTICES = 5u;       // texel buffer RGBA32F
 const uint BIND_ATTRIBUTES = 6u;     // texel buffer RGBA32F
-const uint BIND_MATERIALS = 7u;      // storage: Material[]
+const uint BIND_MATERIALS = 7u;      // texel buffer RGBA32UI: Material[]
 const uint BIND_TEXTURE_USES = 8u;   // storage: TextureUse[]
 const uint BIND_TEXELS = 9u;         // texel buffer R32UI
-const uint BIND_LIGHTS = 10u;        // storage: Light[]
+const uint BIND_LIGHTS = 10u;        // texel buffer RGBA32UI: Light[]
 const uint BIND_ENV_MAP = 11u;       // texel buffer RGBA32F
 const uint BIND_ENV_TABLE = 12u;     // storage: EnvTexel[]
 const uint BIND_SCENE = 13u;         // acceleration structure (ray query)
 const uint BIND_BVH_NODES = 14u;     // texel buffer RGBA32UI, five texels a node (own BVH)
-const uint BIND_BVH_TRIANGLES = 15u; // texel buffer RGBA32F, three texels a triangle (own BVH)
+const uint BIND_BVH_TRIANGLES = 15u; // texel buffer RGBA32UI, three texels a triangle (own BVH)
 const uint BIND_PROBE_RAYS = 16u;    // storage: ProbeRay[] (probe kernel)
 const uint BIND_PROBE_HITS = 17u;    // storage: ProbeHit[] (probe kernel)
 

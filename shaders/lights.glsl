@@ -35,33 +35,38 @@ LightSample light_sample_triangle(Light light, vec3 from, vec2 u)
     s.pdf = 0.0;
     s.is_infinite = false;
     s.is_delta = false;
-    uvec4 triangle = texelFetch(triangles, int(light.triangle));
-    TriangleShape shape = surface_shape(light.instance, triangle);
-    Material material = materials[triangle.w & TRIANGLE_MATERIAL_MASK];
     vec2 bary = sample_triangle(u);
-    vec3 point = shape.v0 + bary.x * shape.e1 + bary.y * shape.e2;
+    vec3 point = light.position + bary.x * light.edge1 + bary.y * light.edge2;
     vec3 to = point - from;
     float distance2 = dot(to, to);
-    vec3 cross_edges = cross(shape.e1, shape.e2);
-    vec3 front = normalize(shape.is_mirrored ? -cross_edges : cross_edges);
+    vec3 cross_edges = cross(light.edge1, light.edge2);
+    float doubled_area = length(cross_edges);
+    vec3 front = ((light.material & LIGHT_MIRRORED) != 0u ? -cross_edges : cross_edges) / doubled_area;
     s.wi = to * inversesqrt(distance2);
     float cosine = -dot(front, s.wi);
-    bool is_lit = cosine > 0.0 || (cosine < 0.0 && (material.flags & MATERIAL_DOUBLE_SIDED) != 0u);
+    uint index = light.material & TRIANGLE_MATERIAL_MASK;
+    bool is_lit = cosine > 0.0 || (cosine < 0.0 && (light.material & LIGHT_DOUBLE_SIDED) != 0u);
     if (!is_lit || !(distance2 > 0.0)) {
         return s;
     }
-    s.radiance = surface_emission(material, triangle, bary);
-    if (HAS_BLEND && (material.flags & MATERIAL_BLEND) != 0u) {
-        s.radiance *= clamp(surface_base_color(material, triangle, bary).a, 0.0, 1.0);
-    }
-    if (HAS_ALPHA && (triangle.w & TRIANGLE_IS_MASKED) != 0u
-        && surface_base_color(material, triangle, bary).a < material.alpha_cutoff) {
-        return s;
+    s.radiance = light.intensity;
+    bool is_plain = (light.material & LIGHT_PLAIN) != 0u;
+    if ((HAS_TEXTURES || HAS_ATTRIBUTES || HAS_ALPHA || HAS_BLEND) && !is_plain) {
+        Material material = scene_material(index);
+        uvec4 triangle = texelFetch(triangles, int(light.triangle));
+        s.radiance = surface_emission(material, triangle, bary);
+        float alpha = surface_base_color(material, triangle, bary).a;
+        if (HAS_BLEND && (material.flags & MATERIAL_BLEND) != 0u) {
+            s.radiance *= clamp(alpha, 0.0, 1.0);
+        }
+        if (HAS_ALPHA && (material.flags & MATERIAL_MASK) != 0u && alpha < material.alpha_cutoff) {
+            return s;
+        }
     }
     // The ray stops short of the emitter by the bound on the error of its points.
-    s.target = offset_origin(point, shape.error, cosine > 0.0 ? front : -front);
-    float area = 0.5 * length(cross_edges);
-    float density = params.light_uniform > 0.0 ? params.light_uniform / area : material.emission_pdf;
+    vec3 magnitude = abs(light.position) + abs(light.edge1) + abs(light.edge2);
+    s.target = offset_origin(point, surface_error(magnitude, light.edge1, light.edge2), cosine > 0.0 ? front : -front);
+    float density = params.light_uniform > 0.0 ? params.light_uniform / (0.5 * doubled_area) : light.emission_pdf;
     s.pdf = params.table_choice * density * distance2 / abs(cosine);
     return s;
 }
@@ -115,10 +120,8 @@ LightSample light_sample(vec3 from, vec4 u)
         return s;
     }
     uint index = min(uint(choice * float(params.light_count)), params.light_count - 1u);
-    Light light = lights[index];
-    if (u.w >= light.keep) {
-        light = lights[light.alias];
-    }
+    uvec4 entry = texelFetch(lights, int(LIGHT_TEXELS * index));
+    Light light = scene_light(u.w < uintBitsToFloat(entry.z) ? index : entry.y);
     if (HAS_AREA_LIGHTS && (!HAS_PUNCTUAL || light.kind == LIGHT_TRIANGLE)) {
         return light_sample_triangle(light, from, u.yz);
     }

@@ -12,11 +12,40 @@ layout(binding = BIND_INSTANCES, scalar) readonly buffer InstancesBlock { Instan
 layout(binding = BIND_TRIANGLES) uniform usamplerBuffer triangles;
 layout(binding = BIND_VERTICES) uniform samplerBuffer vertices;
 layout(binding = BIND_ATTRIBUTES) uniform samplerBuffer attributes;
-layout(binding = BIND_MATERIALS, scalar) readonly buffer MaterialsBlock { Material materials[]; };
+layout(binding = BIND_MATERIALS) uniform usamplerBuffer materials;
 layout(binding = BIND_TEXTURE_USES, scalar) readonly buffer TextureUsesBlock { TextureUse texture_uses[]; };
 layout(binding = BIND_TEXELS) uniform usamplerBuffer texels;
-layout(binding = BIND_LIGHTS, scalar) readonly buffer LightsBlock { Light lights[]; };
+layout(binding = BIND_LIGHTS) uniform usamplerBuffer lights;
 layout(binding = BIND_ENV_MAP) uniform samplerBuffer env_map;
 layout(binding = BIND_ENV_TABLE, scalar) readonly buffer EnvTableBlock { EnvTexel env_table[]; };
+
+// The material's words; groups that are not used cost nothing.
+Material scene_material(uint index)
+{
+    int at = int(MATERIAL_TEXELS * index);
+    uvec4 a = texelFetch(materials, at);
+    uvec4 b = texelFetch(materials, at + 1);
+    uvec4 c = texelFetch(materials, at + 2);
+    uvec4 d = texelFetch(materials, at + 3);
+    uvec4 e = texelFetch(materials, at + 4);
+    vec4 shape = uintBitsToFloat(c);
+    return Material(uintBitsToFloat(a.xyz), a.w, uintBitsToFloat(b.xyz), uintBitsToFloat(b.w), shape.x, shape.y, shape.z,
+                    shape.w, uintBitsToFloat(d.xyz), uintBitsToFloat(d.w), uintBitsToFloat(e.x), e.y, e.z, e.w);
+}
+
+// An entry of the light table; groups that are not used cost nothing.
+Light scene_light(uint index)
+{
+    int at = int(LIGHT_TEXELS * index);
+    uvec4 a = texelFetch(lights, at);
+    uvec4 b = texelFetch(lights, at + 1);
+    uvec4 c = texelFetch(lights, at + 2);
+    uvec4 d = texelFetch(lights, at + 3);
+    uvec4 e = texelFetch(lights, at + 4);
+    uvec4 f = texelFetch(lights, at + 5);
+    return Light(a.x, a.y, uintBitsToFloat(a.z), uintBitsToFloat(a.w), uintBitsToFloat(b.xyz), b.w,
+                 uintBitsToFloat(c.xyz), c.w, uintBitsToFloat(d.xyz), uintBitsToFloat(d.w), uintBitsToFloat(e.xyz),
+                 uintBitsToFloat(e.w), uintBitsToFloat(f.xyz), uintBitsToFloat(f.w));
+}
 
 #endif

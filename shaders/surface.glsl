@@ -57,6 +57,15 @@ uvec4 surface_triangle(uint instance, uint primitive)
     return texelFetch(triangles, int(first + primitive));
 }
 
+// Bound on the error of each component of a point computed by the edge form,
+// where `magnitude` bounds the terms that were summed. A point may gain as much
+// across the plane as the edges are long: the largest component of the edges
+// enters everywhere, so that an axis-aligned plane through 0 is left as well.
+vec3 surface_error(vec3 magnitude, vec3 e1, vec3 e2)
+{
+    return vec3(POSITION_ROUNDINGS * EPSILON) * (magnitude + 0.25 * max_component(abs(e1) + abs(e2)));
+}
+
 TriangleShape surface_shape(uint instance, uvec4 triangle)
 {
     vec3 a = texelFetch(vertices, int(2u * triangle.x)).xyz;
@@ -68,22 +77,18 @@ TriangleShape surface_shape(uint instance, uvec4 triangle)
     if (HAS_INSTANCES && instances[instance].is_identity == 0u) {
         Instance placed = instances[instance];
         mat3 m = mat3(placed.world_from_object_x, placed.world_from_object_y, placed.world_from_object_z);
-        mat3 m_abs = mat3(abs(m[0]), abs(m[1]), abs(m[2]));
         shape.v0 = m * a + placed.world_from_object_t;
         shape.e1 = m * (b - a);
         shape.e2 = m * (c - a);
         // Roundings of the transform count against its largest terms.
-        magnitude = m_abs * magnitude + abs(placed.world_from_object_t);
+        magnitude = mat3(abs(m[0]), abs(m[1]), abs(m[2])) * magnitude + abs(placed.world_from_object_t);
         shape.is_mirrored = placed.is_mirrored != 0u;
     } else {
         shape.v0 = a;
         shape.e1 = b - a;
         shape.e2 = c - a;
     }
-    // A point may gain as much in the plane as the edges are long: the bound
-    // takes the largest component, so that an axis-aligned plane through 0 is
-    // left as well.
-    shape.error = vec3(POSITION_ROUNDINGS * EPSILON) * (magnitude + 0.25 * max_component(abs(shape.e1) + abs(shape.e2)));
+    shape.error = surface_error(magnitude, shape.e1, shape.e2);
     return shape;
 }
 
@@ -138,7 +143,7 @@ vec4 surface_base_color(Material material, uvec4 triangle, vec2 bary)
 bool surface_is_opaque(uint instance, uint primitive, vec2 bary)
 {
     uvec4 triangle = surface_triangle(instance, primitive);
-    Material material = materials[triangle.w & TRIANGLE_MATERIAL_MASK];
+    Material material = scene_material(triangle.w & TRIANGLE_MATERIAL_MASK);
     return surface_base_color(material, triangle, bary).a >= material.alpha_cutoff;
 }
 
@@ -146,7 +151,7 @@ bool surface_is_opaque(uint instance, uint primitive, vec2 bary)
 float surface_coverage(uint instance, uint primitive, vec2 bary)
 {
     uvec4 triangle = surface_triangle(instance, primitive);
-    Material material = materials[triangle.w & TRIANGLE_MATERIAL_MASK];
+    Material material = scene_material(triangle.w & TRIANGLE_MATERIAL_MASK);
     if ((material.flags & MATERIAL_BLEND) == 0u) {
         return 1.0;
     }
@@ -228,7 +233,7 @@ SurfacePoint surface_point(Hit hit, vec3 wo)
 {
     uvec4 triangle = surface_triangle(hit.instance, hit.primitive);
     TriangleShape shape = surface_shape(hit.instance, triangle);
-    Material material = materials[triangle.w & TRIANGLE_MATERIAL_MASK];
+    Material material = scene_material(triangle.w & TRIANGLE_MATERIAL_MASK);
 
     SurfacePoint s;
     // Edge form: it stays in the plane to two roundings, unlike a + b + c weighted.
@@ -262,7 +267,7 @@ SurfacePoint surface_point(Hit hit, vec3 wo)
     s.alpha = HAS_BLEND && (material.flags & MATERIAL_BLEND) != 0u ? clamp(base_color.a, 0.0, 1.0) : 1.0;
     s.emission = vec3(0.0);
     s.emission_pdf = 0.0;
-    if (HAS_AREA_LIGHTS && material.emission_pdf > 0.0 && (s.is_front || (material.flags & MATERIAL_DOUBLE_SIDED) != 0u)) {
+    if (HAS_AREA_LIGHTS && (material.flags & MATERIAL_EMISSIVE) != 0u && (s.is_front || (material.flags & MATERIAL_DOUBLE_SIDED) != 0u)) {
         s.emission = surface_emission(material, triangle, hit.bary);
         s.emission_pdf = material.emission_pdf;
     }

@@ -18,7 +18,7 @@
 #define TRAVERSE_SOFTWARE_GLSL
 
 layout(binding = BIND_BVH_NODES) uniform usamplerBuffer bvh_nodes;
-layout(binding = BIND_BVH_TRIANGLES) uniform samplerBuffer bvh_triangles;
+layout(binding = BIND_BVH_TRIANGLES) uniform usamplerBuffer bvh_triangles;
 
 // The builder bounds the depth of both levels so that this is enough.
 const uint BVH_STACK_SIZE = 32u;
@@ -31,7 +31,7 @@ const uint BVH_NODE_BITS = 0xFF000000u;
 const uint BVH_RECORD_MASKED = 1u;
 
 uvec4 bvh_node_texel(uint index) { return texelFetch(bvh_nodes, int(index)); }
-vec4 bvh_triangle_texel(uint index) { return texelFetch(bvh_triangles, int(index)); }
+uvec4 bvh_triangle_texel(uint index) { return texelFetch(bvh_triangles, int(index)); }
 
 // What is computed once for a ray in one space.
 struct BvhRay {
@@ -85,12 +85,20 @@ vec4 bvh_planes(uint word, float scale, float offset) { return vec4(bvh_bytes(wo
 // Bits of four children that the ray may meet.
 uint bvh_four_hits(uvec3 near_words, uvec3 far_words, vec3 scale, vec3 near_offset, vec3 far_offset,
                    float t_min, float t_max, uint meta, uint octant) {
-    vec4 near = max(max(bvh_planes(near_words.x, scale.x, near_offset.x),
-                        bvh_planes(near_words.y, scale.y, near_offset.y)),
-                    max(bvh_planes(near_words.z, scale.z, near_offset.z), vec4(t_min)));
-    vec4 far = min(min(bvh_planes(far_words.x, scale.x, far_offset.x),
-                       bvh_planes(far_words.y, scale.y, far_offset.y)),
-                   min(bvh_planes(far_words.z, scale.z, far_offset.z), vec4(t_max)));
+    // Comparisons instead of min and max, which take three instructions each on
+    // lavapipe for the sake of NaN; `precise` keeps them. Nothing here is NaN.
+    precise vec4 nx = bvh_planes(near_words.x, scale.x, near_offset.x);
+    precise vec4 ny = bvh_planes(near_words.y, scale.y, near_offset.y);
+    precise vec4 nz = bvh_planes(near_words.z, scale.z, near_offset.z);
+    precise vec4 fx = bvh_planes(far_words.x, scale.x, far_offset.x);
+    precise vec4 fy = bvh_planes(far_words.y, scale.y, far_offset.y);
+    precise vec4 fz = bvh_planes(far_words.z, scale.z, far_offset.z);
+    precise vec4 near = mix(ny, nx, greaterThan(nx, ny));
+    near = mix(near, nz, greaterThan(nz, near));
+    near = mix(near, vec4(t_min), lessThan(near, vec4(t_min)));
+    precise vec4 far = mix(fy, fx, lessThan(fx, fy));
+    far = mix(far, fz, lessThan(fz, far));
+    far = mix(far, vec4(t_max), greaterThan(far, vec4(t_max)));
     // Low five bits of a slot's byte: 24 + slot for a node, offset of the record for a leaf. Upper three: 001 for
     // a node, number of records in unary for a leaf.
     uint is_node = ((meta & (meta << 1)) & 0x10101010u) >> 4;
@@ -146,11 +154,47 @@ bool bvh_intersect(BvhRay ray, vec3 v0, vec3 v1, vec3 v2, out float t, out vec2 
     return (least >= 0.0 || most <= 0.0) && sum != 0.0;
 }
 
+// The stack of groups that wait, its two newest entries in registers. On
+// lavapipe a masked store to indexed memory costs more than a box test, and a
+// branch is only skipped when it holds more than a few instructions; spilling
+// two at a time is rare and long enough. An entry's second word is never 0.
+uvec2 bvh_spilled[BVH_STACK_SIZE];
+uint bvh_height; // entries in bvh_spilled, even
+uvec2 bvh_newest;
+uvec2 bvh_older; // 0 where bvh_newest is
+
+void bvh_push(uvec2 entry) {
+    if (bvh_older.y != 0u) {
+        bvh_spilled[bvh_height] = bvh_older;
+        bvh_spilled[bvh_height + 1u] = bvh_newest;
+        bvh_height += 2u;
+        bvh_newest = uvec2(0u);
+    }
+    bvh_older = bvh_newest;
+    bvh_newest = entry;
+}
+
+// The newest entry; its second word is 0 when there is none.
+uvec2 bvh_pop() {
+    uvec2 entry = bvh_newest;
+    bvh_newest = bvh_older;
+    bvh_older = uvec2(0u);
+    if (entry.y == 0u && bvh_height != 0u) {
+        bvh_height -= 2u;
+        bvh_newest = bvh_spilled[bvh_height];
+        entry = bvh_spilled[bvh_height + 1u];
+    }
+    return entry;
+}
+
+uint bvh_waiting() { return bvh_height + (bvh_newest.y != 0u ? 1u : 0u) + (bvh_older.y != 0u ? 1u : 0u); }
+
 // Both traversals; `any_hit` ends at the first hit and is a literal at both calls.
 bool bvh_trace(vec3 origin, vec3 dir, float t_min, float t_max, bool any_hit, out Hit hit) {
-    uvec2 stack[BVH_STACK_SIZE];
-    uint height = 0u;
-    uint base = 0u; // height at which the instance is left
+    bvh_height = 0u;
+    bvh_newest = uvec2(0u);
+    bvh_older = uvec2(0u);
+    uint base = 0u; // entries that wait when the instance is left
     BvhRay ray = bvh_ray(origin, dir);
     uint instance = HAS_INSTANCES ? NONE : 0u; // NONE: in the top level
     uvec2 nodes = uvec2(params.bvh_root, 0x80000000u);
@@ -159,12 +203,12 @@ bool bvh_trace(vec3 origin, vec3 dir, float t_min, float t_max, bool any_hit, ou
     while (true) {
         if (leaves.y == 0u) {
             if ((nodes.y & BVH_NODE_BITS) == 0u) {
-                if (HAS_INSTANCES && instance != NONE && height == base) {
+                if (HAS_INSTANCES && instance != NONE && bvh_waiting() == base) {
                     instance = NONE;
                     ray = bvh_ray(origin, dir);
                 }
-                if (height == 0u) break;
-                nodes = stack[--height];
+                nodes = bvh_pop();
+                if (nodes.y == 0u) break;
             }
             if (HAS_INSTANCES && (nodes.y & BVH_NODE_BITS) == 0u) {
                 leaves = nodes;
@@ -173,7 +217,7 @@ bool bvh_trace(vec3 origin, vec3 dir, float t_min, float t_max, bool any_hit, ou
                 uint slot = (bit - 24u) ^ (ray.octant & 7u);
                 uint index = nodes.x + bitCount(nodes.y & ~(0xFFFFFFFFu << slot) & 0xFFu);
                 nodes.y &= ~(1u << bit);
-                if ((nodes.y & BVH_NODE_BITS) != 0u) stack[height++] = nodes;
+                if ((nodes.y & BVH_NODE_BITS) != 0u) bvh_push(nodes);
                 bvh_visit(index, ray, t_min, hit.t, nodes, leaves);
             }
         }
@@ -181,13 +225,13 @@ bool bvh_trace(vec3 origin, vec3 dir, float t_min, float t_max, bool any_hit, ou
         for (uint i = 0u; i < 2u && leaves.y != 0u; i++) {
             uint record = 3u * (leaves.x + uint(findLSB(leaves.y)));
             leaves.y &= leaves.y - 1u;
-            vec4 v0 = bvh_triangle_texel(record);
+            uvec4 v0 = bvh_triangle_texel(record);
             if (HAS_INSTANCES && instance == NONE) {
                 // A leaf entry of the top level: leave what remains for later and enter the group.
-                if ((nodes.y & BVH_NODE_BITS) != 0u) stack[height++] = nodes;
-                if (leaves.y != 0u) stack[height++] = leaves;
-                base = height;
-                instance = floatBitsToUint(v0.w);
+                if ((nodes.y & BVH_NODE_BITS) != 0u) bvh_push(nodes);
+                if (leaves.y != 0u) bvh_push(leaves);
+                base = bvh_waiting();
+                instance = v0.w;
                 nodes = uvec2(instances[instance].bvh_root, 0x80000000u);
                 leaves.y = 0u;
                 vec3 x = instances[instance].object_from_world_x;
@@ -197,20 +241,22 @@ bool bvh_trace(vec3 origin, vec3 dir, float t_min, float t_max, bool any_hit, ou
                 ray = bvh_ray(moved, x * dir.x + y * dir.y + z * dir.z);
                 break;
             }
-            vec4 v1 = bvh_triangle_texel(record + 1u);
-            vec4 v2 = bvh_triangle_texel(record + 2u);
+            uvec4 v1 = bvh_triangle_texel(record + 1u);
+            uvec4 v2 = bvh_triangle_texel(record + 2u);
             float t;
             vec2 bary;
-            if (bvh_intersect(ray, v0.xyz, v1.xyz, v2.xyz, t, bary) && t > t_min && t < hit.t) {
-                uint primitive = floatBitsToUint(v0.w);
-                bool is_masked = HAS_ALPHA && (floatBitsToUint(v1.w) & BVH_RECORD_MASKED) != 0u;
+            if (bvh_intersect(ray, uintBitsToFloat(v0.xyz), uintBitsToFloat(v1.xyz), uintBitsToFloat(v2.xyz), t, bary) && t > t_min && t < hit.t) {
+                uint primitive = v0.w;
+                bool is_masked = HAS_ALPHA && (v1.w & BVH_RECORD_MASKED) != 0u;
                 if (!is_masked || surface_is_opaque(instance, primitive, bary)) {
                     hit = Hit(t, bary, instance, primitive);
                     if (any_hit) {
                         // Nothing left to do: the loop ends by itself.
                         nodes.y = 0u;
                         leaves.y = 0u;
-                        height = 0u;
+                        bvh_height = 0u;
+                        bvh_newest = uvec2(0u);
+                        bvh_older = uvec2(0u);
                     }
                 }
             }

@@ -105,6 +105,8 @@ shared! {
         specular: f32,
         normal_scale: f32,
         first_texture: u32,
+        reserved_0: u32,
+        reserved_1: u32,
     }
     TextureUse {
         first_texel: u32,
@@ -117,16 +119,19 @@ shared! {
     }
     Light {
         kind: u32,
-        instance: u32,
-        triangle: u32,
         alias: u32,
         keep: f32,
         choice: f32,
         position: [f32; 3],
-        direction: [f32; 3],
-        intensity: [f32; 3],
+        material: u32,
+        edge1: [f32; 3],
+        triangle: u32,
+        edge2: [f32; 3],
         cos_inner: f32,
+        direction: [f32; 3],
         cos_outer: f32,
+        intensity: [f32; 3],
+        emission_pdf: f32,
     }
     EnvTexel {
         keep: f32,
@@ -162,6 +167,8 @@ tags! {
     MATERIAL_BLEND = 4;
     MATERIAL_HAS_TEXTURES = 8;
     MATERIAL_UNLIT = 16;
+    MATERIAL_EMISSIVE = 32;
+    MATERIAL_TEXELS = 5;
     TEXTURE_BASE_COLOR = 0;
     TEXTURE_METALLIC_ROUGHNESS = 1;
     TEXTURE_NORMAL = 2;
@@ -182,6 +189,10 @@ tags! {
     LIGHT_POINT = 1;
     LIGHT_SPOT = 2;
     LIGHT_DIRECTIONAL = 3;
+    LIGHT_TEXELS = 6;
+    LIGHT_PLAIN = 0x80000000;
+    LIGHT_DOUBLE_SIDED = 0x40000000;
+    LIGHT_MIRRORED = 0x20000000;
     FILM_FLOATS = 6;
     FILM_FLOATS_AOV = 14;
     LEDGER_NON_FINITE = 0;

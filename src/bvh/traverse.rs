@@ -94,7 +94,7 @@ impl Prepared {
     }
 }
 
-/// Rows are multiples and sums of coordinates with exact factors 0 and 1, so that this equals [Woop13] without
+/// Rows are multiples and sums of coordinates with exact factors 0 and 1, so that this equals \[Woop13\] without
 /// its permutation of axes.
 fn shear(d: Vec3) -> [Vec3; 3] {
     let a = d.abs();
@@ -157,7 +157,7 @@ fn node_hits(node: &Node, ray: &Prepared, t_min: f32, t_max: f32) -> u32 {
     hits
 }
 
-/// Parameter and weights of the second and third vertex. [Woop13] without its fall-back to double precision: a
+/// Parameter and weights of the second and third vertex. \[Woop13\] without its fall-back to double precision: a
 /// product that is rounded once keeps the sign of each edge's function right or makes it zero, in both of the
 /// triangles that share the edge, and zero counts as inside.
 fn intersect(record: &Record, ray: &Prepared) -> Option<(f32, [f32; 2])> {

@@ -6,17 +6,12 @@ use std::sync::Arc;
 use glam::Vec3;
 
 use super::upload::SceneData;
-use super::vulkan::texel;
+use super::vulkan::{RECORDS, texel};
 use crate::bvh::{Bvh, GroupDesc, InstanceDesc, Quality};
 use crate::error::Result;
-use crate::gpu::{
-    BindingKind, Blas, BlasGeometry, Buffer, Device, Resource, TexelFormat, Tlas, TlasInstance,
-};
+use crate::gpu::{BindingKind, Blas, BlasGeometry, Buffer, Device, Resource, Tlas, TlasInstance};
 use crate::layout;
 use crate::spec::kernels;
-
-const NODE_FORMAT: TexelFormat = TexelFormat::Rgba32Uint;
-const RECORD_FORMAT: TexelFormat = TexelFormat::Rgba32Float;
 
 /// The own tree of a scene.
 pub(super) fn build_bvh(data: &SceneData) -> Result<Bvh> {
@@ -133,14 +128,8 @@ impl Traversal {
 /// The tree on the device.
 pub(super) fn upload_bvh(device: &Arc<Device>, bvh: &Bvh) -> Result<Traversal> {
     Ok(Traversal::Software {
-        nodes: texel(device, "bvh nodes", NODE_FORMAT, &bvh.nodes, false)?,
-        records: texel(
-            device,
-            "bvh triangles",
-            RECORD_FORMAT,
-            &bvh.triangles,
-            false,
-        )?,
+        nodes: texel(device, "bvh nodes", RECORDS, &bvh.nodes, false)?,
+        records: texel(device, "bvh triangles", RECORDS, &bvh.triangles, false)?,
     })
 }
 

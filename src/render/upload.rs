@@ -151,22 +151,26 @@ impl SceneData {
         let count = emitters.len();
         let LightTable { lights, total } = lights::table(emitters, is_uniform);
         self.lights = lights;
+        for (record, emission) in self.materials.iter_mut().zip(emissions) {
+            if *emission > 0.0 && count > 0 {
+                // Power of a unit area, as in `emissive_triangles`.
+                let power = std::f64::consts::PI * emission * sides(record.flags);
+                record.emission_pdf = (power / total) as f32;
+                record.flags |= layout::MATERIAL_EMISSIVE;
+            }
+        }
+        for light in &mut self.lights {
+            if light.kind == layout::LIGHT_TRIANGLE {
+                let material = light.material & layout::TRIANGLE_MATERIAL_MASK;
+                light.emission_pdf = self.materials[material as usize].emission_pdf;
+            }
+        }
         self.params.light_count = count as u32;
         self.params.light_uniform = if is_uniform && count > 0 {
             1.0 / count as f32
         } else {
             0.0
         };
-        for (record, emission) in self.materials.iter_mut().zip(emissions) {
-            // Power of one side of a unit area, as in `emissive_triangles`.
-            let sides = sides(record.flags);
-            let density = std::f64::consts::PI * emission * sides / total;
-            record.emission_pdf = if *emission > 0.0 && count > 0 {
-                density as f32
-            } else {
-                0.0
-            };
-        }
         let env_choice = match (self.spec.environment, count) {
             (false, _) => 0.0,
             (true, 0) => 1.0,
@@ -180,7 +184,7 @@ impl SceneData {
     /// Every placed triangle that emits, with its power: π · radiance · area · sides.
     fn emissive_triangles(&self, scene: &Scene, emissions: &[f64]) -> Vec<Emitter> {
         let mut emitters = Vec::new();
-        for (index, placement) in self.geometry.placements.iter().enumerate() {
+        for placement in &self.geometry.placements {
             for triangle in self.geometry.groups[placement.group].triangles.clone() {
                 let material =
                     self.geometry.triangles[triangle][3] & layout::TRIANGLE_MATERIAL_MASK;
@@ -188,19 +192,24 @@ impl SceneData {
                 if emission <= 0.0 {
                     continue;
                 }
+                let record = &self.materials[material as usize];
                 let [a, b, c] = self
                     .geometry
                     .corners(triangle)
                     .map(|p| placement.world_from_object.transform_point3(p.as_dvec3()));
                 let area = 0.5 * (b - a).cross(c - a).length();
-                let both = scene.materials[material as usize].double_sided
-                    || scene.materials[material as usize].unlit;
-                let power = std::f64::consts::PI * emission * area * if both { 2.0 } else { 1.0 };
+                let power = std::f64::consts::PI * emission * area * sides(record.flags);
                 if power > 0.0 {
+                    let is_mirrored = placement.world_from_object.matrix3.determinant() < 0.0;
+                    let flags = light_flags(scene, material, record, is_mirrored);
                     let light = layout::Light {
                         kind: layout::LIGHT_TRIANGLE,
-                        instance: index as u32,
+                        position: a.as_vec3().to_array(),
+                        material: material | flags,
+                        edge1: (b - a).as_vec3().to_array(),
                         triangle: triangle as u32,
+                        edge2: (c - a).as_vec3().to_array(),
+                        intensity: record.emission,
                         ..Default::default()
                     };
                     emitters.push(Emitter { light, power });
@@ -211,6 +220,26 @@ impl SceneData {
     }
 }
 
+/// What the light table says of an emitter's material and placement.
+fn light_flags(scene: &Scene, material: u32, record: &layout::Material, is_mirrored: bool) -> u32 {
+    let m = &scene.materials[material as usize];
+    let has_colors = scene
+        .meshes
+        .iter()
+        .any(|mesh| mesh.material == material && !mesh.colors.is_empty());
+    let is_plain =
+        !spec::has_textures(m) && m.alpha_mode == AlphaMode::Opaque && !(m.unlit && has_colors);
+    let is_double_sided = record.flags & layout::MATERIAL_DOUBLE_SIDED != 0;
+    [
+        (is_plain, layout::LIGHT_PLAIN),
+        (is_double_sided, layout::LIGHT_DOUBLE_SIDED),
+        (is_mirrored, layout::LIGHT_MIRRORED),
+    ]
+    .iter()
+    .fold(0, |flags, (on, flag)| flags | if *on { *flag } else { 0 })
+}
+
+/// Sides that emit.
 fn sides(flags: u32) -> f64 {
     if flags & layout::MATERIAL_DOUBLE_SIDED != 0 {
         2.0

@@ -16,6 +16,8 @@ use crate::layout::{self, ProbeHit, ProbeRay};
 use crate::settings::BackendChoice;
 use crate::spec;
 
+/// Records that mix integers and floats are read as integers, whose bits no device changes.
+pub(super) const RECORDS: TexelFormat = TexelFormat::Rgba32Uint;
 /// Invocations of a probe's work group.
 const PROBE_GROUP: u32 = 64;
 
@@ -149,8 +151,8 @@ impl VulkanBackend {
             ),
             (
                 layout::BIND_MATERIALS,
-                storage,
-                upload(device, "materials", &data.materials)?,
+                BindingKind::Texel,
+                texel(device, "materials", RECORDS, &data.materials, false)?,
             ),
             (
                 layout::BIND_TEXTURE_USES,
@@ -164,8 +166,8 @@ impl VulkanBackend {
             ),
             (
                 layout::BIND_LIGHTS,
-                storage,
-                upload(device, "lights", &data.lights)?,
+                BindingKind::Texel,
+                texel(device, "lights", RECORDS, &data.lights, false)?,
             ),
             (
                 layout::BIND_ENV_MAP,
