@@ -46,6 +46,14 @@ fn constants(text: &str) -> Vec<(&str, u32)> {
         .collect()
 }
 
+/// As `assert_eq`, but shows the first difference only.
+fn compare<T: PartialEq + std::fmt::Debug>(found: &[T], expected: &[T], what: &str) {
+    for (a, b) in found.iter().zip(expected) {
+        assert_eq!(a, b, "{what}");
+    }
+    assert_eq!(found.len(), expected.len(), "{what}: one is longer");
+}
+
 #[test]
 fn structs_are_the_same_in_rust_and_glsl() {
     let probe = Module::read("layout_probe");
@@ -63,7 +71,11 @@ fn structs_are_the_same_in_rust_and_glsl() {
             .iter()
             .map(|(n, at)| (n.as_str(), *at))
             .collect();
-        assert_eq!(fields, rust.fields, "{}: GLSL, then Rust", rust.name);
+        compare(
+            &fields,
+            rust.fields,
+            &format!("{}: GLSL, then Rust", rust.name),
+        );
         assert_eq!(
             glsl.stride, rust.size,
             "size of {}: GLSL, then Rust",
@@ -74,11 +86,8 @@ fn structs_are_the_same_in_rust_and_glsl() {
 
 #[test]
 fn constants_are_the_same_in_rust_and_glsl() {
-    assert_eq!(
-        constants(&shader("layout.glsl")),
-        CONSTANTS,
-        "GLSL, then Rust"
-    );
+    let text = shader("layout.glsl");
+    compare(&constants(&text), CONSTANTS, "GLSL, then Rust");
 }
 
 #[test]
