@@ -34,6 +34,16 @@ fn main() {
         );
         fs::write(out.join(format!("{name}.spv")), spirv).expect("OUT_DIR is writable");
     }
+    // Unoptimised: names survive for tests/layout.rs to read, whatever is unused.
+    let probe = compile(
+        &compiler,
+        "tests/layout_probe.comp",
+        &[],
+        shaderc::OptimizationLevel::Zero,
+    );
+    fs::write(out.join("layout_probe.spv"), probe).expect("OUT_DIR is writable");
+    // OUT_DIR is unknown where integration tests are compiled; this reaches them.
+    println!("cargo::rustc-env=ETENDUE_SHADER_DIR={}", out.display());
 }
 
 /// SPIR-V of one entry, or a build failure that shows the compiler's message.

@@ -8,7 +8,7 @@ use crate::error::{Error, Result};
 /// Which traversal answers "what does this ray meet?".
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum BackendChoice {
-    /// By device: see [`crate::render::choose_backend`].
+    /// Ray query where the device likely has hardware for it, else our own tree.
     #[default]
     Auto,
     /// VK_KHR_ray_query in a compute shader.

@@ -6,6 +6,7 @@ pub mod geometry;
 mod lights;
 mod passes;
 mod report;
+mod traversal;
 mod upload;
 mod vulkan;
 
@@ -284,7 +285,7 @@ pub fn devices() -> Result<Vec<DeviceInfo>> {
 /// Geometry that no tree can hold.
 pub fn model(scene: &Scene, settings: &Settings) -> Result<SceneModel> {
     let data = SceneData::new(scene, settings, geometry::DEFAULT_COPY_LIMIT);
-    let bvh = vulkan::build_bvh(&data)?;
+    let bvh = traversal::build_bvh(&data)?;
     let triangles = data.geometry.triangles.len() as u64;
     let window = settings.window();
     let pixels = u64::from(window.x1 - window.x0) * u64::from(window.y1 - window.y0);

@@ -1,25 +1,23 @@
-//! The Vulkan side of a render: buffers, pipeline, batches. The two traversals
-//! differ in one buffer or structure and in which module is compiled.
+//! The Vulkan side of a render: buffers, pipeline, batches. What the two
+//! traversals do not share is in `traversal`.
 
 use std::ops::Range;
 use std::sync::Arc;
 
-use glam::Vec3;
-
+use super::traversal::{Traversal, build_bvh, build_query, upload_bvh};
 use super::upload::SceneData;
 use super::{DeviceOptions, Ledger, Memory};
-use crate::bvh::{Bvh, GroupDesc, InstanceDesc, Quality};
 use crate::error::{Error, Result};
 use crate::gpu::{
-    self, BindSet, BindingKind, Blas, BlasGeometry, Buffer, ComputePipeline, Device, DeviceKind,
-    DeviceRequest, PipelineDesc, Resource, TexelFormat, Tlas, TlasInstance, Usage,
+    self, BindSet, BindingKind, Buffer, ComputePipeline, Device, DeviceKind, DeviceRequest,
+    PipelineDesc, Resource, TexelFormat, Usage,
 };
 use crate::layout::{self, ProbeHit, ProbeRay};
 use crate::settings::BackendChoice;
 use crate::spec;
 
 /// Records that mix integers and floats are read as integers, whose bits no device changes.
-const RECORDS: TexelFormat = TexelFormat::Rgba32Uint;
+pub(super) const RECORDS: TexelFormat = TexelFormat::Rgba32Uint;
 /// Invocations of a probe's work group.
 const PROBE_GROUP: u32 = 64;
 
@@ -58,99 +56,6 @@ pub(super) fn open(
                 Ok(()) => String::from("ray query on a CPU is slower than our own tree"),
             };
             Ok((device, BackendChoice::Bvh, reason))
-        }
-    }
-}
-
-/// The own tree of a scene.
-pub(super) fn build_bvh(data: &SceneData) -> Result<Bvh> {
-    let geometry = &data.geometry;
-    let positions: Vec<Vec<Vec3>> = geometry
-        .groups
-        .iter()
-        .map(|g| {
-            g.triangles
-                .clone()
-                .flat_map(|t| geometry.corners(t))
-                .collect()
-        })
-        .collect();
-    let masked: Vec<Vec<bool>> = geometry
-        .groups
-        .iter()
-        .map(|g| {
-            if !g.has_cutouts {
-                return Vec::new();
-            }
-            geometry.triangles[g.triangles.clone()]
-                .iter()
-                .map(|t| t[3] & layout::TRIANGLE_IS_MASKED != 0)
-                .collect()
-        })
-        .collect();
-    let groups: Vec<GroupDesc> = positions
-        .iter()
-        .zip(&masked)
-        .map(|(positions, masked)| GroupDesc { positions, masked })
-        .collect();
-    let mut instances = Vec::new();
-    if geometry.has_instances() {
-        for (placement, record) in geometry.placements.iter().zip(&data.instances) {
-            instances.push(InstanceDesc {
-                group: placement.group as u32,
-                world_from_object: world_from_object(record),
-                object_from_world: [
-                    record.object_from_world_x,
-                    record.object_from_world_y,
-                    record.object_from_world_z,
-                    record.object_from_world_t,
-                ],
-            });
-        }
-    }
-    Bvh::build(&groups, &instances, Quality::Balanced)
-}
-
-fn world_from_object(record: &layout::Instance) -> [[f32; 3]; 4] {
-    [
-        record.world_from_object_x,
-        record.world_from_object_y,
-        record.world_from_object_z,
-        record.world_from_object_t,
-    ]
-}
-
-/// What answers "what does this ray meet?".
-enum Traversal {
-    Software { nodes: Buffer, records: Buffer },
-    Query { scene: Tlas, bytes: u64 },
-}
-
-impl Traversal {
-    fn bindings(&self) -> Vec<(u32, BindingKind)> {
-        match self {
-            Self::Software { .. } => vec![
-                (layout::BIND_BVH_NODES, BindingKind::Texel),
-                (layout::BIND_BVH_TRIANGLES, BindingKind::Texel),
-            ],
-            Self::Query { .. } => vec![(layout::BIND_SCENE, BindingKind::AccelerationStructure)],
-        }
-    }
-
-    fn resources(&self) -> Vec<(u32, Resource<'_>)> {
-        match self {
-            Self::Software { nodes, records } => vec![
-                (layout::BIND_BVH_NODES, Resource::Buffer(nodes)),
-                (layout::BIND_BVH_TRIANGLES, Resource::Buffer(records)),
-            ],
-            Self::Query { scene, .. } => vec![(layout::BIND_SCENE, Resource::Acceleration(scene))],
-        }
-    }
-
-    fn bytes(&self) -> u64 {
-        match self {
-            Self::Software { nodes, records } => nodes.bytes() + records.bytes(),
-            Self::Query { bytes, .. } => *bytes,
         }
     }
 }
@@ -297,10 +202,6 @@ impl VulkanBackend {
             Usage::STORAGE,
             gpu::Memory::DeviceLocal,
         )?;
-        let spirv = match traversal {
-            Traversal::Software { .. } => spec::kernels::PATH_SOFTWARE,
-            Traversal::Query { .. } => spec::kernels::PATH_QUERY,
-        };
         let mut bindings: Vec<_> = shared.iter().map(|(at, kind, _)| (*at, *kind)).collect();
         bindings.extend([(layout::BIND_FILM, storage), (layout::BIND_LEDGER, storage)]);
         bindings.extend(traversal.bindings());
@@ -308,7 +209,7 @@ impl VulkanBackend {
             device,
             &PipelineDesc {
                 name: "path",
-                spirv: &spec::words(spirv),
+                spirv: &spec::words(traversal.path_kernel()),
                 bindings: &bindings,
                 constants: &data.spec.constants(),
                 push_bytes: size_of::<layout::Batch>() as u32,
@@ -445,10 +346,6 @@ impl VulkanBackend {
 
     /// What given rays meet.
     pub fn probe(&self, rays: &[ProbeRay]) -> Result<Vec<ProbeHit>> {
-        let spirv = match self.traversal {
-            Traversal::Software { .. } => spec::kernels::PROBE_SOFTWARE,
-            Traversal::Query { .. } => spec::kernels::PROBE_QUERY,
-        };
         let storage = BindingKind::Storage;
         let mut bindings: Vec<_> = self
             .shared
@@ -464,7 +361,7 @@ impl VulkanBackend {
             &self.device,
             &PipelineDesc {
                 name: "probe",
-                spirv: &spec::words(spirv),
+                spirv: &spec::words(self.traversal.probe_kernel()),
                 bindings: &bindings,
                 constants: &self.spec.constants(),
                 push_bytes: size_of::<layout::Batch>() as u32,
@@ -515,7 +412,8 @@ fn upload<T: bytemuck::Pod>(device: &Arc<Device>, name: &str, data: &[T]) -> Res
     Buffer::from_slice(device, name, Usage::STORAGE, data)
 }
 
-fn texel<T: bytemuck::Pod>(
+/// A texel buffer, of which acceleration structures are built if `is_input`.
+pub(super) fn texel<T: bytemuck::Pod>(
     device: &Arc<Device>,
     name: &str,
     format: TexelFormat,
@@ -529,50 +427,6 @@ fn texel<T: bytemuck::Pod>(
         usage
     };
     Buffer::from_slice(device, name, usage, data)
-}
-
-fn upload_bvh(device: &Arc<Device>, bvh: &Bvh) -> Result<Traversal> {
-    Ok(Traversal::Software {
-        nodes: texel(device, "bvh nodes", RECORDS, &bvh.nodes, false)?,
-        records: texel(device, "bvh triangles", RECORDS, &bvh.triangles, false)?,
-    })
-}
-
-fn build_query(device: &Arc<Device>, data: &SceneData, vertices: &Buffer) -> Result<Traversal> {
-    let geometry = &data.geometry;
-    let mut bytes = 0;
-    let mut groups = Vec::with_capacity(geometry.groups.len());
-    for group in &geometry.groups {
-        let triangles: Vec<[u32; 3]> = geometry.triangles[group.triangles.clone()]
-            .iter()
-            .map(|t| [t[0], t[1], t[2]])
-            .collect();
-        let blas = Blas::build(
-            device,
-            "group",
-            &BlasGeometry {
-                vertices,
-                vertex_stride: 32,
-                vertex_count: (geometry.vertices.len() / 2) as u32,
-                triangles: &triangles,
-                opaque: !group.has_cutouts,
-            },
-        )?;
-        bytes += blas.bytes();
-        groups.push(blas);
-    }
-    let instances: Vec<TlasInstance> = geometry
-        .placements
-        .iter()
-        .zip(&data.instances)
-        .map(|(placement, record)| TlasInstance {
-            blas: &groups[placement.group],
-            world_from_object: world_from_object(record),
-        })
-        .collect();
-    let scene = Tlas::build(device, "scene", &instances)?;
-    bytes += scene.bytes();
-    Ok(Traversal::Query { scene, bytes })
 }
 
 fn film_floats(aovs: bool) -> u64 {

@@ -1,0 +1,158 @@
+//! The structs, bindings and constants that Rust and GLSL share, compared name by
+//! name. The SPIR-V of shaders/tests/layout_probe.comp says what the compiler
+//! made of the GLSL; no device is needed.
+#![allow(
+    clippy::unwrap_used,
+    reason = "the lint's exception for tests does not reach their helpers"
+)]
+
+#[path = "layout/specialisation.rs"]
+mod specialisation;
+#[path = "layout/spirv.rs"]
+mod spirv;
+
+use etendue::layout::{CONSTANTS, STRUCTS};
+use etendue::settings::{Settings, Strategy};
+use etendue::spec::Spec;
+
+use spirv::Module;
+
+/// The kernels that render and probe; test kernels have bindings of their own.
+const KERNELS: [&str; 4] = [
+    "path_software",
+    "path_query",
+    "probe_software",
+    "probe_query",
+];
+
+fn shader(name: &str) -> String {
+    let path = format!("{}/shaders/{name}", env!("CARGO_MANIFEST_DIR"));
+    std::fs::read_to_string(path).unwrap()
+}
+
+/// Name and value of each `const uint NAME = VALUE;` line, in order.
+fn constants(text: &str) -> Vec<(&str, u32)> {
+    text.lines()
+        .filter_map(|line| {
+            let (name, rest) = line.strip_prefix("const uint ")?.split_once(" = ")?;
+            let value = rest.split_once("u;").unwrap().0;
+            let value = match value.strip_prefix("0x") {
+                Some(digits) => u32::from_str_radix(digits, 16),
+                None => value.parse(),
+            };
+            Some((name, value.unwrap()))
+        })
+        .collect()
+}
+
+#[test]
+fn structs_are_the_same_in_rust_and_glsl() {
+    let probe = Module::read("layout_probe");
+    let declared = shader("layout.glsl")
+        .lines()
+        .filter_map(|line| line.strip_prefix("struct ")?.strip_suffix(" {"))
+        .map(str::to_owned)
+        .collect::<Vec<_>>();
+    let names: Vec<_> = STRUCTS.iter().map(|s| s.name).collect();
+    assert_eq!(declared, names, "structs of layout.glsl, and of layout.rs");
+    for rust in STRUCTS {
+        let glsl = probe.structure(rust.name);
+        let fields: Vec<_> = glsl
+            .fields
+            .iter()
+            .map(|(n, at)| (n.as_str(), *at))
+            .collect();
+        assert_eq!(fields, rust.fields, "{}: GLSL, then Rust", rust.name);
+        assert_eq!(
+            glsl.stride, rust.size,
+            "size of {}: GLSL, then Rust",
+            rust.name
+        );
+    }
+}
+
+#[test]
+fn constants_are_the_same_in_rust_and_glsl() {
+    assert_eq!(
+        constants(&shader("layout.glsl")),
+        CONSTANTS,
+        "GLSL, then Rust"
+    );
+}
+
+#[test]
+fn specialisation_constants_are_the_same_in_rust_and_glsl() {
+    let probe = Module::read("layout_probe");
+    let spec = Spec::default();
+    let mut names: Vec<String> = spec
+        .features()
+        .map(|(name, _)| format!("HAS_{}", name.to_uppercase().replace('-', "_")))
+        .to_vec();
+    names.push(String::from("STRATEGY"));
+    let ids: Vec<u32> = spec.constants().iter().map(|(id, _)| *id).collect();
+    let rust: Vec<_> = ids.into_iter().zip(names).collect();
+    assert_eq!(probe.spec_ids(), rust, "GLSL, then Rust");
+}
+
+#[test]
+fn features_switch_the_constant_of_their_name() {
+    let everything = Spec::default().with_everything().features();
+    for (position, (name, _)) in everything.into_iter().enumerate() {
+        let mut spec = Spec::default();
+        match name {
+            "textures" => spec.textures = true,
+            "alpha" => spec.alpha = true,
+            "blend" => spec.blend = true,
+            "specular" => spec.specular = true,
+            "normals" => spec.normals = true,
+            "attributes" => spec.attributes = true,
+            "environment" => spec.environment = true,
+            "area-lights" => spec.area_lights = true,
+            "punctual" => spec.punctual = true,
+            "instances" => spec.instances = true,
+            "aovs" => spec.aovs = true,
+            _ => panic!("{name} is not a field of Spec that this test knows"),
+        }
+        let on: Vec<u32> = spec
+            .constants()
+            .into_iter()
+            .filter_map(|(id, value)| (value == 1).then_some(id))
+            .collect();
+        assert_eq!(on, [position as u32], "{name}");
+    }
+}
+
+#[test]
+fn strategies_are_the_same_in_rust_and_glsl() {
+    let text = shader("spec.glsl");
+    let rust = [
+        ("STRATEGY_MIS", Strategy::Mis),
+        ("STRATEGY_LIGHT_ONLY", Strategy::LightOnly),
+        ("STRATEGY_BSDF_ONLY", Strategy::BsdfOnly),
+    ]
+    .map(|(name, strategy)| {
+        let settings = Settings {
+            strategy,
+            ..Default::default()
+        };
+        let spec = Spec::for_scene(&etendue::scene::Scene::default(), &settings);
+        (name, spec.constants().last().unwrap().1)
+    });
+    assert_eq!(constants(&text), rust);
+}
+
+#[test]
+fn kernels_use_the_bindings_of_the_table() {
+    let table: Vec<u32> = CONSTANTS
+        .iter()
+        .filter_map(|(name, value)| name.starts_with("BIND_").then_some(*value))
+        .collect();
+    let mut used: Vec<u32> = KERNELS
+        .iter()
+        .flat_map(|name| Module::read(name).bindings_in_use())
+        .collect();
+    used.sort_unstable();
+    used.dedup();
+    // Both ways: nothing unknown is bound, and nothing in the table is dead.
+    assert_eq!(used, table);
+}

@@ -1,0 +1,136 @@
+//! A feature that a scene does not need leaves nothing behind: the path kernels
+//! are frozen by `spirv-opt` as a driver would, and their code is looked at.
+use std::io::ErrorKind;
+use std::process::Command;
+
+use etendue::layout;
+use etendue::spec::Spec;
+
+use crate::spirv::{self, Module};
+
+/// The kernel with its constants set to the spec's and everything dead removed;
+/// `None`, after saying why, where `spirv-opt` is not installed.
+fn frozen(kernel: &str, spec: &Spec) -> Option<Module> {
+    let features = spec.features().map(|(_, on)| on.to_string());
+    let values: Vec<String> = spec
+        .constants()
+        .iter()
+        .enumerate()
+        .map(|(i, (id, value))| match features.get(i) {
+            Some(flag) => format!("{id}:{flag}"),
+            None => format!("{id}:{value}"),
+        })
+        .collect();
+    let output = tempfile::NamedTempFile::new().unwrap();
+    let run = Command::new("spirv-opt")
+        .arg("--set-spec-const-default-value")
+        .arg(values.join(" "))
+        .args([
+            "--freeze-spec-const",
+            "--fold-spec-const-op-composite",
+            "-O",
+        ])
+        .arg(spirv::path(kernel))
+        .arg("-o")
+        .arg(output.path())
+        .output();
+    let run = match run {
+        Err(error) if error.kind() == ErrorKind::NotFound => {
+            println!("skipped: spirv-opt is not installed (Debian package spirv-tools)");
+            return None;
+        }
+        run => run.unwrap(),
+    };
+    let said = String::from_utf8_lossy(&run.stderr);
+    assert!(run.status.success(), "{kernel}: {said}");
+    Some(Module::parse(&std::fs::read(output.path()).unwrap()))
+}
+
+const KERNELS: [&str; 2] = ["path_software", "path_query"];
+
+/// Everything on, the features that only a scene settles included.
+fn everything() -> Spec {
+    Spec {
+        environment: true,
+        instances: true,
+        aovs: true,
+        ..Spec::default().with_everything()
+    }
+}
+
+#[test]
+fn bare_kernels_touch_only_what_every_scene_has() {
+    for kernel in KERNELS {
+        let Some(bare) = frozen(kernel, &Spec::default()) else {
+            return;
+        };
+        let mut expected = vec![
+            layout::BIND_PARAMS,
+            layout::BIND_FILM,
+            layout::BIND_LEDGER,
+            layout::BIND_TRIANGLES,
+            layout::BIND_VERTICES,
+            layout::BIND_MATERIALS,
+        ];
+        expected.extend(match kernel {
+            "path_query" => vec![layout::BIND_SCENE],
+            _ => vec![layout::BIND_BVH_NODES, layout::BIND_BVH_TRIANGLES],
+        });
+        assert_eq!(bare.bindings_in_use(), expected, "{kernel}");
+    }
+}
+
+#[test]
+fn each_feature_removes_code_and_its_buffers() {
+    let off: [(&str, fn(&mut Spec), &[u32]); 11] = [
+        (
+            "textures",
+            |s| s.textures = false,
+            &[layout::BIND_TEXTURE_USES, layout::BIND_TEXELS],
+        ),
+        ("alpha", |s| s.alpha = false, &[]),
+        ("blend", |s| s.blend = false, &[]),
+        ("specular", |s| s.specular = false, &[]),
+        ("normals", |s| s.normals = false, &[]),
+        (
+            "attributes",
+            |s| s.attributes = false,
+            &[layout::BIND_ATTRIBUTES],
+        ),
+        (
+            "environment",
+            |s| s.environment = false,
+            &[layout::BIND_ENV_MAP, layout::BIND_ENV_TABLE],
+        ),
+        ("area-lights", |s| s.area_lights = false, &[]),
+        ("punctual", |s| s.punctual = false, &[]),
+        (
+            "instances",
+            |s| s.instances = false,
+            &[layout::BIND_INSTANCES],
+        ),
+        ("aovs", |s| s.aovs = false, &[]),
+    ];
+    // One kernel is enough: what is switched is the same in both.
+    let kernel = KERNELS[0];
+    let Some(full) = frozen(kernel, &everything()) else {
+        return;
+    };
+    for (name, switch_off, buffers) in off {
+        let mut spec = everything();
+        switch_off(&mut spec);
+        let without = frozen(kernel, &spec).unwrap();
+        assert!(
+            without.code_size() < full.code_size(),
+            "without {name}: {} instructions, with it {}",
+            without.code_size(),
+            full.code_size()
+        );
+        let gone: Vec<u32> = full
+            .bindings_in_use()
+            .into_iter()
+            .filter(|b| !without.bindings_in_use().contains(b))
+            .collect();
+        assert_eq!(gone, buffers, "without {name}");
+    }
+}
