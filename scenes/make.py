@@ -148,12 +148,12 @@ def sun():
     for name, material, place, radius in [
         ("painted sphere", paint, (-1.7, 0.8, 0.2), 0.8),
         ("chalk sphere", chalk, (0.35, 0.6, 0.9), 0.6),
-        ("mirror sphere", mirror, (2.0, 1.0, -0.6), 1.0),
+        ("mirror sphere", mirror, (2.2, 1.0, -0.6), 1.0),
     ]:
         gltf.node(name, mesh=gltf.mesh(name, (ball, material)), translation=place, scale=[radius] * 3)
     ring = gltf.mesh("gold ring", (torus(0.7, 0.22, 64, 24), gold))
     tilt = axis_angle((1, 0, 0), 70)
-    gltf.node("gold ring", mesh=ring, translation=(0.1, 0.92, -1.2), rotation=tilt)
+    gltf.node("gold ring", mesh=ring, translation=(0.1, 0.9475, -1.2), rotation=tilt)
     pole = gltf.mesh("gnomon", (cuboid((-0.03, 0, -0.03), (0.03, 2.4, 0.03)), chalk))
     gltf.node("gnomon", mesh=pole, translation=(-0.6, 0, -2.2))
     gltf.environment(uri="sun.hdr", intensity=1, rotation=0)
@@ -166,8 +166,8 @@ def instances():
     ground = gltf.lambert("ground", (0.35, 0.35, 0.35))
     plane = quad([(-80, 0, -80), (80, 0, -80), (80, 0, 80), (-80, 0, 80)], (0, 1, 0))
     gltf.node("ground", mesh=gltf.mesh("ground", (plane, ground)))
-    copper = gltf.material("lacquer", (0.72, 0.2, 0.06), 0, 0.3)
-    ring = gltf.mesh("ring", (torus(0.5, 0.17, 24, 12), copper))
+    lacquer = gltf.material("lacquer", (0.72, 0.2, 0.06), 0, 0.3)
+    ring = gltf.mesh("ring", (torus(0.5, 0.17, 24, 12), lacquer))
     numbers = random.Random(1)
     golden_angle = math.pi * (3 - math.sqrt(5))
     for i in range(2048):
@@ -193,7 +193,7 @@ def instances():
     gltf.light("lamp", "point", [1, 0.85, 0.65], 150, position=(5, 10, 6))
     gltf.light("sun", "directional", [1, 0.95, 0.85], 1.5, direction=(0.6, -1, -0.5))
     gltf.environment(radiance=[0.22, 0.28, 0.38])
-    gltf.camera("camera", (0, 13, 25), (0, 1.2, 0.5), yfov=round(math.radians(38), 6), aspectRatio=1.6, znear=0.1)
+    gltf.camera("camera", (0, 15, 31), (0, 1.2, -1), yfov=round(math.radians(38), 6), aspectRatio=1.6, znear=0.1)
     return gltf
 
 
@@ -292,7 +292,7 @@ def add_exhibits(gltf):
     ball = gltf.geometry(globe(48, 24), textured=True)
     for name, material, place, radius in [
         ("worn sphere", worn_paint, (-1.0, 0.45, -0.9), 0.45),
-        ("lacquered sphere", lacquer, (0.15, 0.35, -1.1), 0.35),
+        ("lacquered sphere", lacquer, (0.75, 0.35, 0.25), 0.35),
         ("lantern", lantern, (1.35, 0.3, -1.3), 0.3),
     ]:
         gltf.node(name, mesh=gltf.mesh(name, (ball, material)), translation=place, scale=[radius] * 3)
@@ -306,9 +306,9 @@ def add_exhibits(gltf):
     )
     card = gltf.geometry(rectangle((0, 0, 0), (0.5, 0, 0), (0, 0.5, 0)), textured=True)
     turn = axis_angle((0, 1, 0), 25)
-    gltf.node("leaf", mesh=gltf.mesh("leaf", (card, green)), translation=(0.95, 0.55, 0.05), rotation=turn)
+    gltf.node("leaf", mesh=gltf.mesh("leaf", (card, green)), translation=(0.45, 0.52, -0.75), rotation=turn)
     film = gltf.material("film", (0.1, 0.35, 0.6, 0.45), roughness=0.5, alphaMode="BLEND", doubleSided=True)
-    place = {"translation": (-0.55, 0.5, 0.15), "rotation": axis_angle((0, 1, 0), 40), "scale": (0.8, 1, 1)}
+    place = {"translation": (-0.95, 0.5, 0.3), "rotation": axis_angle((0, 1, 0), 40), "scale": (0.8, 1, 1)}
     gltf.node("film", mesh=gltf.mesh("film", (card, film)), **place)
     sign = gltf.material("sign", (0.8, 0.25, 0.02), roughness=0.9, extensions={"KHR_materials_unlit": {}})
     place = {"translation": (0.9, 1.6, -1.98), "scale": (0.5, 0.25, 1)}
