@@ -24,6 +24,15 @@ uint kernel_tile(uint i)
     return k < batch.tile_count ? batch.first_tile + k : NONE;
 }
 
+// Adds to a counter of two words, the low one first.
+void ledger_add(uint low, uint amount)
+{
+    uint before = atomicAdd(ledger[low], amount);
+    if (before > 0xFFFFFFFFu - amount) {
+        atomicAdd(ledger[low + 1u], 1u);
+    }
+}
+
 void main()
 {
     uint tile = kernel_tile(gl_WorkGroupID.x);
@@ -41,6 +50,7 @@ void main()
     FilmNode levels[FILM_LEVELS];
     uint rays = 0u;
     uint truncated = 0u;
+    float truncated_throughput = 0.0;
     uint non_finite = 0u;
     uint level = 0u;
     for (uint i = 0u; i < batch.sample_count; i++) {
@@ -48,7 +58,8 @@ void main()
         uvec4 key = rng_key(seed, pixel_index, batch.first_sample_low + i, batch.first_sample_high);
         PathResult path = path_trace(key, pixel);
         rays += path.rays;
-        truncated += path.is_truncated ? 1u : 0u;
+        truncated += path.truncated > 0.0 ? 1u : 0u;
+        truncated_throughput += path.truncated;
         bool is_dropped = !is_finite(path.radiance);
         non_finite += is_dropped ? 1u : 0u;
 
@@ -66,12 +77,10 @@ void main()
 
     if (truncated != 0u) {
         atomicAdd(ledger[LEDGER_TRUNCATED], truncated);
+        ledger_add(LEDGER_THROUGHPUT_LOW, uint(truncated_throughput * 65536.0 + 0.5));
     }
     if (non_finite != 0u) {
         atomicAdd(ledger[LEDGER_NON_FINITE], non_finite);
     }
-    uint before = atomicAdd(ledger[LEDGER_RAYS_LOW], rays);
-    if (before > 0xFFFFFFFFu - rays) {
-        atomicAdd(ledger[LEDGER_RAYS_HIGH], 1u);
-    }
+    ledger_add(LEDGER_RAYS_LOW, rays);
 }

@@ -197,7 +197,10 @@ const uint LEDGER_NON_FINITE = 0u;
 const uint LEDGER_TRUNCATED = 1u;
 const uint LEDGER_RAYS_LOW = 2u;
 const uint LEDGER_RAYS_HIGH = 3u;
-const uint LEDGER_SIZE = 4u;
+// Throughput that truncated paths still carried, mean of the channels, in units of 2⁻¹⁶.
+const uint LEDGER_THROUGHPUT_LOW = 4u;
+const uint LEDGER_THROUGHPUT_HIGH = 5u;
+const uint LEDGER_SIZE = 6u;
 
 const uint TILE = 8u;
 

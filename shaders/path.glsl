@@ -31,7 +31,7 @@ struct FirstHit {
 struct PathResult {
     vec3 radiance;
     FirstHit first;
-    bool is_truncated; // --max-depth cut it while it still carried light
+    float truncated;   // throughput that --max-depth cut off, mean of the channels
     uint rays;
 };
 
@@ -91,7 +91,7 @@ PathResult path_trace(uvec4 key, uvec2 pixel)
     PathResult result;
     result.radiance = vec3(0.0);
     result.first = FirstHit(vec3(0.0), vec3(0.0), 0.0, 0.0);
-    result.is_truncated = false;
+    result.truncated = 0.0;
     result.rays = 0u;
 
     vec3 beta = vec3(1.0);
@@ -129,7 +129,7 @@ PathResult path_trace(uvec4 key, uvec2 pixel)
             result.radiance += path_bsdf_weight(pdf_bsdf, pdf_light) * beta * s.emission;
         }
         if (depth >= params.max_depth) {
-            result.is_truncated = true;
+            result.truncated = (beta.x + beta.y + beta.z) / 3.0;
             break;
         }
 

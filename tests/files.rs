@@ -82,6 +82,44 @@ fn exr_returns_every_bit_both_windows_and_the_header() {
     }
 }
 
+/// Compression works on blocks of 32 rows and tables of the values that occur: here
+/// every one of many blocks is full of arbitrary bits, NaN included.
+#[test]
+fn arbitrary_bits_survive_compression() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("out.exr");
+    let mut image = sample_image();
+    image.full = (211, 300);
+    image.window = Crop {
+        x0: 0,
+        y0: 7,
+        x1: 211,
+        y1: 300,
+    };
+    let mut state = 1_u64;
+    for channel in &mut image.channels {
+        channel.values = std::iter::repeat_with(|| {
+            state ^= state << 13;
+            state ^= state >> 7;
+            state ^= state << 17;
+            f32::from_bits((state >> 32) as u32)
+        })
+        .take(211 * 293)
+        .collect();
+    }
+    // one flat, one with few values
+    image.channels[0].values.fill(0.25);
+    for (i, value) in image.channels[1].values.iter_mut().enumerate() {
+        *value = ODD[i / 50 % ODD.len()];
+    }
+    write_exr(&path, &image).unwrap();
+    let back = read_exr(&path).unwrap();
+    for channel in &image.channels {
+        let values = back.channel(&channel.name).unwrap();
+        assert!(bits(values) == bits(&channel.values), "{}", channel.name);
+    }
+}
+
 #[test]
 fn the_header_says_what_the_numbers_mean() {
     use exr::math::Vec2;

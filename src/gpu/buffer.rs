@@ -405,6 +405,9 @@ impl Inner {
                 _ => out_of_memory(&self.name, self.bytes),
             }
         })?);
+        if is_map_failure(allocation) {
+            return Err(out_of_memory(&self.name, self.bytes));
+        }
         // SAFETY: fresh buffer and memory of this device; offset and type follow the requirements.
         unsafe { device.bind_buffer_memory(self.raw, allocation.memory(), allocation.offset()) }
             .map_err(|result| allocation_failed(&self.name, self.bytes, result))
@@ -449,6 +452,15 @@ fn limit(device: &Device, usage: Usage) -> (u64, &'static str) {
         );
     }
     limit
+}
+
+/// Whether the memory is none: lavapipe (Mesa 25.0) does not look at mmap's answer
+/// and hands out MAP_FAILED, which is −1, as the start of a mapped block.
+fn is_map_failure(allocation: &Allocation) -> bool {
+    allocation.mapped_ptr().is_some_and(|pointer| {
+        let block = (pointer.as_ptr() as usize).wrapping_sub(allocation.offset() as usize);
+        block == usize::MAX
+    })
 }
 
 fn out_of_memory(name: &str, bytes: u64) -> Error {

@@ -101,7 +101,7 @@ impl Commands {
         self.before_command();
         self.keep(set.clone());
         self.keep(pipeline.clone());
-        self.bind(pipeline, Some(set), push);
+        self.bind(pipeline, set, push);
         // SAFETY: pipeline, set and push constants were just bound; the counts are within the limit.
         unsafe {
             self.device
@@ -185,18 +185,16 @@ impl Commands {
         self.raw
     }
 
-    /// Binds a pipeline and what it reads; the set is optional for planted faults only.
-    pub(super) fn bind(&self, pipeline: &ComputePipeline, set: Option<&BindSet>, push: &[u8]) {
+    /// Binds a pipeline and what it reads.
+    pub(super) fn bind(&self, pipeline: &ComputePipeline, set: &BindSet, push: &[u8]) {
         let device = self.device.raw();
         let point = vk::PipelineBindPoint::COMPUTE;
         // SAFETY: the objects are alive and kept by the caller, the set's layout is the
         // pipeline's, and `push` fills the pipeline's range.
         unsafe {
             device.cmd_bind_pipeline(self.raw, point, pipeline.raw());
-            if let Some(set) = set {
-                let sets = [set.raw()];
-                device.cmd_bind_descriptor_sets(self.raw, point, pipeline.layout(), 0, &sets, &[]);
-            }
+            let sets = [set.raw()];
+            device.cmd_bind_descriptor_sets(self.raw, point, pipeline.layout(), 0, &sets, &[]);
             if !push.is_empty() {
                 let stage = vk::ShaderStageFlags::COMPUTE;
                 device.cmd_push_constants(self.raw, pipeline.layout(), stage, 0, push);

@@ -12,16 +12,18 @@ use super::failed;
 use super::pipeline::{BindSet, ComputePipeline};
 use crate::error::Result;
 
-/// Two dispatches that write the same buffer, with no barrier between them.
+/// Two dispatches, the second of which reads what the first one wrote, with no barrier between
+/// them.
 pub fn missing_barrier(
     device: &Arc<Device>,
     pipeline: &ComputePipeline,
-    set: &BindSet,
+    writer: &BindSet,
+    reader: &BindSet,
     push: &[u8],
 ) -> Result<()> {
     let commands = Commands::begin(device, "fault: missing barrier")?;
-    commands.bind(pipeline, Some(set), push);
-    for _ in 0..2 {
+    for set in [writer, reader] {
+        commands.bind(pipeline, set, push);
         // SAFETY: never submitted; the fault is in the recording only.
         unsafe { device.raw().cmd_dispatch(commands.raw(), 1, 1, 1) };
     }
@@ -36,20 +38,27 @@ pub fn too_many_groups(
     push: &[u8],
 ) -> Result<()> {
     let commands = Commands::begin(device, "fault: too many groups")?;
-    commands.bind(pipeline, Some(set), push);
+    commands.bind(pipeline, set, push);
     let groups = device.caps().max_groups[1].saturating_add(1);
     // SAFETY: as above.
     unsafe { device.raw().cmd_dispatch(commands.raw(), 1, groups, 1) };
     Ok(())
 }
 
-/// A dispatch of a pipeline whose resources were never bound.
-pub fn unbound_set(device: &Arc<Device>, pipeline: &ComputePipeline, push: &[u8]) -> Result<()> {
-    let commands = Commands::begin(device, "fault: unbound set")?;
-    commands.bind(pipeline, None, push);
-    // SAFETY: as above.
-    unsafe { device.raw().cmd_dispatch(commands.raw(), 1, 1, 1) };
-    Ok(())
+/// A storage binding that points to a buffer made for something else.
+pub fn wrong_usage(device: &Arc<Device>, set: &BindSet, binding: u32, buffer: &Buffer) {
+    let buffers = [vk::DescriptorBufferInfo {
+        buffer: buffer.raw(),
+        offset: 0,
+        range: vk::WHOLE_SIZE,
+    }];
+    let write = vk::WriteDescriptorSet::default()
+        .dst_set(set.raw())
+        .dst_binding(binding)
+        .descriptor_type(vk::DescriptorType::STORAGE_BUFFER)
+        .buffer_info(&buffers);
+    // SAFETY: the handles are alive and the set is not in use; the usage is the fault.
+    unsafe { device.raw().update_descriptor_sets(&[write], &[]) };
 }
 
 /// A copy that starts within the buffers and ends outside.

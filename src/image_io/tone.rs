@@ -51,8 +51,8 @@ impl Tone {
 
     /// The stored byte values of a pixel of linear Rec. 709 radiance, exposure applied.
     pub fn bytes(self, linear: [f32; 3]) -> [u8; 3] {
-        // NaN becomes 0: `max` returns its other operand
-        let linear = linear.map(|v| v.max(0.0).min(MAX_INPUT));
+        // NaN, which is not above 0, becomes 0
+        let linear = linear.map(|v| if v > 0.0 { v.min(MAX_INPUT) } else { 0.0 });
         let display = match self {
             Self::None | Self::Srgb => linear,
             Self::Aces => aces(linear),
@@ -111,10 +111,10 @@ fn agx(v: [f32; 3]) -> [f32; 3] {
     const INSET: [[f32; 3]; 3] = [
         [0.842_479_05, 0.078_433_6, 0.079_223_745],
         [0.042_328_242, 0.878_468_64, 0.079_166_13],
-        [0.042_375_655, 0.078_433_6, 0.879_142_97],
+        [0.042_375_655, 0.078_433_6, 0.879_143],
     ];
     const OUTSET: [[f32; 3]; 3] = [
-        [1.196_879, -0.098_020_88, -0.099_029_744],
+        [1.196_879, -0.098_020_88, -0.099_029_74],
         [-0.052_896_85, 1.151_903_1, -0.098_961_18],
         [-0.052_971_635, -0.098_043_45, 1.151_073_7],
     ];

@@ -1,1 +1,309 @@
-//! Placeholder.
+//! Introduces scenes to devices: chooses a traversal, uploads, runs batches and
+//! collects the film. A render is a pure function of (scene, settings); batch
+//! sizes, and stopping and going on, do not change a bit of it.
+
+pub mod geometry;
+mod lights;
+mod passes;
+mod report;
+mod upload;
+mod vulkan;
+
+use std::time::Instant;
+
+use crate::error::{Error, Result};
+use crate::film::Film;
+use crate::gpu::{self, Caps};
+use crate::layout::{self, ProbeHit, ProbeRay};
+use crate::scene::Scene;
+use crate::settings::{BackendChoice, Settings};
+
+pub use report::{
+    Control, DeviceInfo, Feature, Ledger, Memory, Progress, Report, SceneModel, Times,
+};
+
+use passes::Passes;
+use upload::SceneData;
+use vulkan::{Band, Batch, VulkanBackend};
+
+/// A batch aims at this long, seconds: far below the watchdogs of drivers (2 s on Windows).
+const BATCH_SECONDS: f64 = 0.1;
+/// A pass aims at no more than this long, seconds: what a stop may throw away.
+const PASS_SECONDS: f64 = 1.0;
+/// Tiles of the first batch: few enough for the slowest device and scene.
+const FIRST_BATCH_TILES: u32 = 16;
+
+/// Which device, and whether to watch it.
+#[derive(Clone, Debug, Default)]
+pub struct DeviceOptions {
+    /// Index or part of the name; `None` takes the fastest kind.
+    pub device: Option<String>,
+    /// Runs the Khronos validation layer.
+    pub validation: bool,
+}
+
+/// Details that do not change the picture; for tests and measurements.
+#[doc(hidden)]
+#[derive(Clone, Copy, Debug)]
+pub struct Tuning {
+    /// Most samples of a pass; a power of two.
+    pub max_pass: u64,
+    /// Most tiles of a batch.
+    pub max_tiles: u32,
+    /// Shared meshes are copied into world space up to so many triangles.
+    pub copy_limit: usize,
+    /// Compiles in everything, whether the scene needs it or not.
+    pub everything: bool,
+}
+
+impl Default for Tuning {
+    fn default() -> Self {
+        Self {
+            max_pass: 1 << passes::MAX_PASS_LEVEL,
+            max_tiles: u32::MAX,
+            copy_limit: geometry::DEFAULT_COPY_LIMIT,
+            everything: false,
+        }
+    }
+}
+
+/// Renders one scene with one group of settings on one device.
+pub struct Renderer {
+    backend: VulkanBackend,
+    settings: Settings,
+    tuning: Tuning,
+    tiles_per_batch: u32,
+    report: Report,
+}
+
+impl Renderer {
+    /// Opens a device, uploads the scene and compiles what it needs.
+    ///
+    /// # Errors
+    /// Settings out of range, no device that can do it, or too little memory.
+    pub fn new(scene: &Scene, settings: &Settings, options: &DeviceOptions) -> Result<Self> {
+        Self::tuned(scene, settings, options, Tuning::default())
+    }
+
+    /// As [`Self::new`], with details that do not change the picture.
+    #[doc(hidden)]
+    pub fn tuned(
+        scene: &Scene,
+        settings: &Settings,
+        options: &DeviceOptions,
+        tuning: Tuning,
+    ) -> Result<Self> {
+        settings.validate()?;
+        if let Some(camera) = settings.camera.filter(|c| *c >= scene.cameras.len()) {
+            return Err(Error::Settings {
+                name: "--camera",
+                what: format!(
+                    "there is no camera {camera}; the scene has {}",
+                    scene.cameras.len()
+                ),
+            });
+        }
+        let start = Instant::now();
+        let (device, choice, reason) = vulkan::open(settings.backend, options)?;
+        let mut data = SceneData::new(scene, settings, tuning.copy_limit);
+        if tuning.everything {
+            data.spec = data.spec.with_everything();
+        }
+        let mut backend = VulkanBackend::new(&device, choice, &data)?;
+        let build = start.elapsed().as_secs_f64();
+        let start = Instant::now();
+        backend.warm_up()?;
+        let compile = start.elapsed().as_secs_f64();
+        let caps = device.caps();
+        tracing::info!(backend = choice.name(), reason, device = caps.name, "ready");
+        let report = Report {
+            backend: choice,
+            backend_reason: reason,
+            device: caps.name.clone(),
+            driver: caps.driver.clone(),
+            features: features(&data.spec),
+            times: Times {
+                build,
+                compile,
+                render: 0.0,
+            },
+            memory: backend.memory(),
+            rays: 0,
+            paths: 0,
+            ledger: Ledger::default(),
+        };
+        Ok(Self {
+            backend,
+            settings: settings.clone(),
+            tuning,
+            tiles_per_batch: FIRST_BATCH_TILES.min(tuning.max_tiles),
+            report,
+        })
+    }
+
+    /// Renders the samples of the settings in passes, calling `control` after
+    /// every batch. After [`Control::Stop`] the film holds the complete passes.
+    ///
+    /// # Errors
+    /// The device fails.
+    pub fn render(&mut self, control: &mut dyn FnMut(&Progress) -> Control) -> Result<Film> {
+        let settings = &self.settings;
+        let mut film = Film::new(
+            settings.window(),
+            (settings.width, settings.height),
+            settings.aovs,
+        );
+        let samples = settings.samples.clone();
+        let total = samples.end - samples.start;
+        let start = Instant::now();
+        self.backend.reset_ledger()?;
+        let mut passes = Passes::new(samples, self.tuning.max_pass);
+        while let Some((first, level)) = passes.upcoming() {
+            let pass_start = Instant::now();
+            let done = passes.done() as f64;
+            let size = (1u64 << level) as f64;
+            let mut tell = |share: f64, pass_complete: bool, film: &Film| {
+                control(&Progress {
+                    film,
+                    samples_done: film.samples(),
+                    samples_total: total,
+                    fraction: (done + share * size) / total as f64,
+                    pass_complete,
+                    elapsed: start.elapsed(),
+                })
+            };
+            let mut between = |share: f64| tell(share, false, &film);
+            let Some(values) = self.pass(first, level, &mut between)? else {
+                break;
+            };
+            film.add(first, level, values)?;
+            passes.finish(pass_start.elapsed().as_secs_f64(), PASS_SECONDS);
+            if tell(1.0, true, &film) == Control::Stop {
+                break;
+            }
+        }
+        self.report.times.render = start.elapsed().as_secs_f64();
+        self.report.paths = film.samples() * film.pixels() as u64;
+        (self.report.rays, self.report.ledger) = self.backend.ledger()?;
+        self.report.memory.film = self.backend.memory().film + film.bytes();
+        Ok(film)
+    }
+
+    /// Renders one node of the film's tree in batches; `between` hears the share
+    /// of the pass that is done. `None` when it asked to stop.
+    fn pass(
+        &mut self,
+        first: u64,
+        level: u32,
+        between: &mut dyn FnMut(f64) -> Control,
+    ) -> Result<Option<Vec<f32>>> {
+        let mut values = Vec::new();
+        for Band { tiles, pixels } in self.backend.bands() {
+            let mut tile = tiles.start;
+            while tile < tiles.end {
+                let count = self.tiles_per_batch.min(tiles.end - tile);
+                let seconds = self.backend.render(&Batch {
+                    first_sample: first,
+                    samples: 1 << level,
+                    tiles: tile..tile + count,
+                    film_first_pixel: pixels.start,
+                })?;
+                tile += count;
+                self.tiles_per_batch =
+                    next_batch(self.tiles_per_batch, count, seconds).min(self.tuning.max_tiles);
+                if between(f64::from(tile) / f64::from(self.backend.tiles())) == Control::Stop {
+                    return Ok(None);
+                }
+            }
+            self.backend.read(pixels.len(), &mut values)?;
+        }
+        Ok(Some(values))
+    }
+
+    /// How the render went.
+    pub fn report(&self) -> Report {
+        self.report.clone()
+    }
+
+    /// What given rays meet in this scene, relative to the scene's origin.
+    ///
+    /// # Errors
+    /// The device fails.
+    #[doc(hidden)]
+    pub fn probe(&self, rays: &[ProbeRay]) -> Result<Vec<ProbeHit>> {
+        self.backend.probe(rays)
+    }
+
+    /// What the validation layer said so far.
+    #[doc(hidden)]
+    pub fn validation_messages(&self) -> Vec<String> {
+        self.backend.validation_messages()
+    }
+}
+
+/// Tiles of the next batch, from how long `count` tiles took.
+fn next_batch(current: u32, count: u32, seconds: f64) -> u32 {
+    let fitting = f64::from(count) * BATCH_SECONDS / seconds.max(1e-6);
+    // At most fourfold: the next tiles may cost more.
+    (fitting as u32).clamp(1, current.saturating_mul(4))
+}
+
+fn features(spec: &crate::spec::Spec) -> Vec<Feature> {
+    spec.features()
+        .into_iter()
+        .map(|(name, on)| Feature { name, on })
+        .collect()
+}
+
+/// The devices of this machine and what each can run.
+///
+/// # Errors
+/// There is no Vulkan driver; the message names packages that bring one.
+pub fn devices() -> Result<Vec<DeviceInfo>> {
+    let info = |caps: Caps| {
+        let (major, minor, patch) = caps.api_version;
+        DeviceInfo {
+            index: caps.index,
+            name: caps.name,
+            kind: caps.kind.name().to_owned(),
+            driver: caps.driver,
+            api_version: format!("{major}.{minor}.{patch}"),
+            backends: vec![
+                (BackendChoice::RayQuery, caps.ray_query),
+                (BackendChoice::Bvh, caps.compute),
+            ],
+            subgroup: caps.subgroup_size,
+        }
+    };
+    Ok(gpu::enumerate()?.into_iter().map(info).collect())
+}
+
+/// What the scene needs, without a device.
+///
+/// # Errors
+/// Geometry that no tree can hold.
+pub fn model(scene: &Scene, settings: &Settings) -> Result<SceneModel> {
+    let data = SceneData::new(scene, settings, geometry::DEFAULT_COPY_LIMIT);
+    let bvh = vulkan::build_bvh(&data)?;
+    let triangles = data.geometry.triangles.len() as u64;
+    let window = settings.window();
+    let pixels = u64::from(window.x1 - window.x0) * u64::from(window.y1 - window.y0);
+    let floats = if settings.aovs {
+        layout::FILM_FLOATS_AOV
+    } else {
+        layout::FILM_FLOATS
+    };
+    let memory = Memory {
+        geometry: data.geometry.bytes(),
+        acceleration: bvh.bytes(),
+        textures: data.texture_bytes(),
+        film: pixels * 4 * u64::from(floats),
+    };
+    Ok(SceneModel {
+        features: features(&data.spec),
+        triangles,
+        bytes_per_triangle: (memory.geometry + memory.acceleration) as f64
+            / triangles.max(1) as f64,
+        memory,
+    })
+}

@@ -30,9 +30,8 @@ pub(super) fn decode(
             quote(mime)
         ));
     }
-    let format = match image::guess_format(bytes) {
-        Ok(format @ (ImageFormat::Png | ImageFormat::Jpeg)) => format,
-        _ => return Err(String::from("is neither a PNG nor a JPEG image")),
+    let Ok(format @ (ImageFormat::Png | ImageFormat::Jpeg)) = image::guess_format(bytes) else {
+        return Err(String::from("is neither a PNG nor a JPEG image"));
     };
     let broken = |error: image::ImageError| format!("cannot be decoded: {error}");
     let (width, height) = ImageReader::with_format(Cursor::new(bytes), format)

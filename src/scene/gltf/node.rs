@@ -102,12 +102,8 @@ fn check_tree(root: &Root) -> Check<Vec<bool>> {
     }
     // With one parent at most, whatever the roots do not reach hangs on a cycle.
     let mut is_reached = vec![false; root.nodes.len()];
-    let mut stack: Vec<u32> = Vec::new();
-    for i in 0..root.nodes.len() {
-        if parents[i].is_none() {
-            stack.push(i as u32);
-        }
-    }
+    let roots = (0..).zip(&parents).filter(|(_, parent)| parent.is_none());
+    let mut stack: Vec<u32> = roots.map(|(i, _)| i).collect();
     while let Some(i) = stack.pop() {
         is_reached[i as usize] = true;
         stack.extend(&root.nodes[i as usize].children);

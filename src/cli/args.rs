@@ -1,0 +1,293 @@
+//! What can be typed. Turning it into settings is `render.rs`'s part.
+
+use std::ops::Range;
+use std::path::PathBuf;
+
+use clap::builder::PossibleValuesParser;
+use clap::{ArgAction, Args, Parser, Subcommand, ValueEnum};
+use etendue::film::MAX_SAMPLES;
+use etendue::image_io::{Aov, Tone};
+use etendue::settings::{BackendChoice, Crop, Estimator, MAX_SIDE};
+
+/// A physically based path tracer on Vulkan: glTF in, radiometrically right OpenEXR out.
+#[derive(Parser)]
+#[command(version, max_term_width = 100)]
+pub struct Arguments {
+    /// What to do.
+    #[command(subcommand)]
+    pub command: Command,
+}
+
+/// The commands.
+#[derive(Subcommand)]
+pub enum Command {
+    /// Render a scene
+    Render(Box<RenderArgs>),
+    /// Show devices and, with a scene, what it holds and needs
+    Info(InfoArgs),
+}
+
+/// `etendue info`
+#[derive(Args)]
+pub struct InfoArgs {
+    /// Scene: .gltf or .glb
+    pub scene: Option<PathBuf>,
+    /// Print one JSON object
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// `etendue render`
+#[derive(Args)]
+pub struct RenderArgs {
+    /// Scene: .gltf or .glb
+    pub scene: PathBuf,
+    /// Image to write, .exr or .png by its suffix; may be given several times
+    #[arg(short, long, value_name = "FILE", required = true)]
+    pub output: Vec<PathBuf>,
+
+    /// Samples per pixel at most; the first limit reached stops [default: 128]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=MAX_SAMPLES))]
+    pub spp: Option<u64>,
+    /// Seconds of rendering at most; at least one pass is rendered
+    #[arg(long, value_name = "SECONDS", allow_negative_numbers = true, value_parser = positive)]
+    pub time: Option<f64>,
+    /// Stop when the standard error is at most X of the signal, both as root mean
+    /// squares over the image; tested from 16 samples on
+    #[arg(long, value_name = "X", allow_negative_numbers = true, value_parser = positive)]
+    pub noise: Option<f64>,
+    /// Seed of the random numbers
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    pub seed: u64,
+    /// Global sample indices, A is rendered, B is not: the shard of a larger render
+    #[arg(long, value_name = "A..B", conflicts_with = "spp", value_parser = samples)]
+    pub samples: Option<Range<u64>>,
+
+    /// Width of the frame in pixels [default: 1280, or from the height]
+    #[arg(long, value_name = "N", value_parser = side())]
+    pub width: Option<u32>,
+    /// Height of the frame in pixels [default: from the width and the camera's aspect, else 16:9]
+    #[arg(long, value_name = "N", value_parser = side())]
+    pub height: Option<u32>,
+    /// Pixels of the frame to render; X1 and Y1 are not part of it
+    #[arg(long, value_name = "X0,Y0,X1,Y1", value_parser = crop)]
+    pub crop: Option<Crop>,
+    /// Camera of the scene, by name or index [default: the first, else one that frames the scene]
+    #[arg(long, value_name = "NAME|INDEX")]
+    pub camera: Option<String>,
+
+    /// Latitude-longitude image that lights the scene, .hdr or .exr; replaces the scene's own
+    #[arg(long, value_name = "FILE")]
+    pub env: Option<PathBuf>,
+    /// Factor on the image's values
+    #[arg(long, value_name = "X", requires = "env", default_value_t = 1.0, allow_negative_numbers = true, value_parser = not_negative)]
+    pub env_intensity: f64,
+    /// Rotation of the image about +Y, right-handed
+    #[arg(long, value_name = "DEGREES", requires = "env", default_value_t = 0.0,
+          allow_negative_numbers = true, value_parser = finite)]
+    pub env_rotation: f64,
+
+    /// Scattering events at most; 0: unlimited
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    pub max_depth: u32,
+    /// How rays are traced
+    #[arg(long, value_enum, default_value_t = Backend::Auto)]
+    pub backend: Backend,
+    /// Vulkan device, by index or a part of its name
+    #[arg(long, value_name = "INDEX|NAME")]
+    pub device: Option<String>,
+    /// Everything that lowers the error for the time, or the yardstick
+    #[arg(long, value_enum, default_value_t = EstimatorName::Full)]
+    pub estimator: EstimatorName,
+
+    /// Extra layers of the EXR, separated by commas
+    #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = aov())]
+    pub aov: Vec<String>,
+    /// Tone curve of display formats; EXR is always linear. none: linear values
+    /// stored unencoded; srgb: clamped, then the sRGB transfer curve
+    #[arg(long, default_value = Tone::Srgb.name(),
+          value_parser = PossibleValuesParser::new(Tone::ALL.map(Tone::name)))]
+    pub tonemap: String,
+    /// Exposure of display formats in stops
+    #[arg(long, value_name = "EV", default_value_t = 0.0, allow_negative_numbers = true,
+          value_parser = finite)]
+    pub exposure: f64,
+
+    /// Write statistics as JSON
+    #[arg(long, value_name = "FILE.json")]
+    pub stats: Option<PathBuf>,
+    /// How progress is shown on stderr; auto: a bar on a terminal, else plain lines
+    #[arg(long, value_enum, default_value_t = ProgressName::Auto)]
+    pub progress: ProgressName,
+    /// Show errors only
+    #[arg(short, long, conflicts_with = "verbose")]
+    pub quiet: bool,
+    /// Show what is done (-vv: in detail)
+    #[arg(short, long, action = ArgAction::Count)]
+    pub verbose: u8,
+}
+
+impl RenderArgs {
+    /// The layers asked for, each once, in order of their definition.
+    pub fn aovs(&self) -> Vec<Aov> {
+        let asked = |aov: &Aov| self.aov.iter().any(|name| name == aov.name());
+        Aov::ALL.into_iter().filter(asked).collect()
+    }
+
+    /// The tone curve asked for.
+    pub fn tone(&self) -> Tone {
+        Tone::ALL
+            .into_iter()
+            .find(|tone| tone.name() == self.tonemap)
+            .expect("the parser admits only these names")
+    }
+}
+
+/// `--backend`
+#[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum Backend {
+    /// The fastest one that the device can run
+    Auto,
+    /// The device's ray query (VK_KHR_ray_query)
+    RayQuery,
+    /// Own bounding volume hierarchy in a compute shader; needs no ray tracing hardware
+    Bvh,
+}
+
+impl From<Backend> for BackendChoice {
+    fn from(backend: Backend) -> Self {
+        match backend {
+            Backend::Auto => Self::Auto,
+            Backend::RayQuery => Self::RayQuery,
+            Backend::Bvh => Self::Bvh,
+        }
+    }
+}
+
+/// `--estimator`
+#[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum EstimatorName {
+    /// Everything that lowers the error for the time
+    Full,
+    /// BSDF sampling, next event estimation with uniform light choice, independent random numbers
+    Textbook,
+}
+
+impl From<EstimatorName> for Estimator {
+    fn from(estimator: EstimatorName) -> Self {
+        match estimator {
+            EstimatorName::Full => Self::Full,
+            EstimatorName::Textbook => Self::Textbook,
+        }
+    }
+}
+
+/// `--progress`
+#[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum ProgressName {
+    /// A bar on a terminal, else plain lines
+    Auto,
+    /// A line every few seconds
+    Plain,
+    /// JSON objects, one a line
+    Json,
+    /// Nothing
+    None,
+}
+
+fn side() -> clap::builder::RangedI64ValueParser<u32> {
+    clap::value_parser!(u32).range(1..=i64::from(MAX_SIDE))
+}
+
+fn aov() -> PossibleValuesParser {
+    PossibleValuesParser::new(Aov::ALL.map(Aov::name))
+}
+
+fn positive(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(value) if value > 0.0 && value.is_finite() => Ok(value),
+        _ => Err(String::from("must be a number above 0")),
+    }
+}
+
+fn not_negative(text: &str) -> Result<f64, String> {
+    finite(text)
+        .ok()
+        .filter(|&value| value >= 0.0)
+        .ok_or_else(|| String::from("must be a number of at least 0"))
+}
+
+fn finite(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        // what is computed with is a float
+        Ok(value) if (value as f32).is_finite() => Ok(value),
+        _ => Err(String::from("must be a number")),
+    }
+}
+
+fn samples(text: &str) -> Result<Range<u64>, String> {
+    let range = text
+        .split_once("..")
+        .and_then(|(a, b)| Some(a.parse().ok()?..b.parse().ok()?));
+    match range {
+        Some(range) if range.start < range.end && range.end <= MAX_SAMPLES => Ok(range),
+        Some(_) => Err(format!("A must be below B, and B at most {MAX_SAMPLES}")),
+        None => Err(String::from("must be two sample indices, e.g. 0..64")),
+    }
+}
+
+fn crop(text: &str) -> Result<Crop, String> {
+    let numbers: Result<Vec<u32>, _> = text.split(',').map(|n| n.trim().parse()).collect();
+    match numbers.as_deref() {
+        Ok(&[x0, y0, x1, y1]) if x0 < x1 && y0 < y1 => Ok(Crop { x0, y0, x1, y1 }),
+        Ok([_, _, _, _]) => Err(String::from("X0 must be below X1 and Y0 below Y1")),
+        _ => Err(String::from(
+            "must be four pixel coordinates, e.g. 0,0,64,64",
+        )),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use clap::CommandFactory;
+
+    use super::*;
+
+    #[test]
+    fn definitions_are_consistent() {
+        Arguments::command().debug_assert();
+    }
+
+    #[test]
+    fn names_are_those_of_the_library() {
+        for &backend in Backend::value_variants() {
+            let name = backend.to_possible_value().expect("none is skipped");
+            assert_eq!(name.get_name(), BackendChoice::from(backend).name());
+        }
+        for &estimator in EstimatorName::value_variants() {
+            let name = estimator.to_possible_value().expect("none is skipped");
+            assert_eq!(name.get_name(), Estimator::from(estimator).name());
+        }
+    }
+
+    #[test]
+    fn ranges_are_half_open_and_not_empty() {
+        assert_eq!(samples("3..77"), Ok(3..77));
+        for bad in [
+            "",
+            "5",
+            "5..5",
+            "6..5",
+            "-1..5",
+            "..5",
+            "0..1e3",
+            "0..9999999999999999999",
+        ] {
+            assert!(samples(bad).is_err(), "{bad}");
+        }
+        assert!(crop("1,2,3,4").is_ok());
+        for bad in ["1,2,3", "1,2,1,4", "1,4,3,2", "-1,0,1,1", "1,2,3,4,5"] {
+            assert!(crop(bad).is_err(), "{bad}");
+        }
+    }
+}

@@ -1,0 +1,149 @@
+//! What is known about a render, under the names of the EXR header. `stats.rs`
+//! nests the same names (`times.load` …), so both files agree.
+
+use std::path::Path;
+
+use etendue::film::Film;
+use etendue::image_io::{Metadata, Value};
+use etendue::render::Report;
+use etendue::scene::Scene;
+use etendue::settings::Settings;
+
+use super::args::{Backend, RenderArgs};
+
+/// Which limit ended a render.
+#[derive(Clone, Copy, PartialEq)]
+pub enum Stop {
+    /// All samples are there.
+    Samples,
+    /// `--time`
+    Time(f64),
+    /// `--noise`
+    Noise(f64),
+    /// Ctrl-C or SIGTERM.
+    Interrupt,
+}
+
+/// Everything about a render that has ended.
+pub struct Record<'a> {
+    /// What was typed.
+    pub args: &'a RenderArgs,
+    /// What it meant.
+    pub settings: &'a Settings,
+    /// What was rendered.
+    pub scene: &'a Scene,
+    /// SHA-256 of the file of `--env`.
+    pub env_hash: Option<String>,
+    /// What the renderer says.
+    pub report: &'a Report,
+    /// The result.
+    pub film: &'a Film,
+    /// Why it ended.
+    pub stop: Stop,
+    /// Seconds it took to load the scene.
+    pub load: f64,
+}
+
+impl Record<'_> {
+    /// The header: all that is needed to render the file again and to judge it.
+    pub fn metadata(&self) -> Metadata {
+        let mut data = Metadata::new();
+        let mut put = |name: &str, value: Value| data.insert(name.to_owned(), value);
+        put("version", env!("CARGO_PKG_VERSION").into());
+        put("scene", path(&self.args.scene));
+        put("scene_hash", self.scene.hash.as_str().into());
+        put("backend", self.report.backend.name().into());
+        put("backend_reason", self.report.backend_reason.as_str().into());
+        put("device", self.report.device.as_str().into());
+        put("driver", self.report.driver.as_str().into());
+        let features = self.report.features.iter().filter(|f| f.on);
+        let features: Vec<_> = features.map(|f| f.name).collect();
+        put("features", features.join(" ").into());
+        let ranges = self.film.ranges().into_iter();
+        let ranges: Vec<_> = ranges.map(|r| format!("{}..{}", r.start, r.end)).collect();
+        put("samples", ranges.join(",").into());
+        put("spp", count(self.film.samples()));
+        put("times.load", self.load.into());
+        put("times.build", self.report.times.build.into());
+        put("times.compile", self.report.times.compile.into());
+        put("times.render", self.report.times.render.into());
+        let ledger = &self.report.ledger;
+        put("ledger.non_finite", count(ledger.non_finite));
+        put("ledger.truncated_paths", count(ledger.truncated_paths));
+        // a limit that looks at the samples favours images that look finished early
+        put("ledger.stop", self.stop_text().into());
+        self.put_settings(&mut data);
+        data
+    }
+
+    /// Every setting under its option's name.
+    fn put_settings(&self, data: &mut Metadata) {
+        let (args, settings) = (self.args, self.settings);
+        let mut put = |name: &str, value: Value| data.insert(format!("settings.{name}"), value);
+        put("width", f64::from(settings.width).into());
+        put("height", f64::from(settings.height).into());
+        if let Some(crop) = settings.crop {
+            let crop = [crop.x0, crop.y0, crop.x1, crop.y1].map(|x| x.to_string());
+            put("crop", crop.join(",").into());
+        }
+        let range = &settings.samples;
+        put("samples", format!("{}..{}", range.start, range.end).into());
+        for (name, limit) in [("time", args.time), ("noise", args.noise)] {
+            if let Some(limit) = limit {
+                put(name, limit.into());
+            }
+        }
+        // all 64 bits count
+        put("seed", settings.seed.to_string().into());
+        put("max_depth", f64::from(settings.max_depth).into());
+        let backend = if args.backend == Backend::Auto {
+            "auto"
+        } else {
+            settings.backend.name()
+        };
+        put("backend", backend.into());
+        put("estimator", settings.estimator.name().into());
+        let strategy = format!("{:?}", settings.strategy).to_lowercase();
+        put("strategy", strategy.into());
+        match settings.camera {
+            Some(index) => {
+                put("camera", (index as f64).into());
+                put(
+                    "camera_name",
+                    self.scene.cameras[index].name.as_str().into(),
+                );
+            }
+            None => drop(put("camera", "default".into())),
+        }
+        if let Some(file) = &args.env {
+            put("env", path(file));
+            put("env_hash", self.env_hash.clone().unwrap_or_default().into());
+            put("env_intensity", args.env_intensity.into());
+            put("env_rotation", args.env_rotation.into());
+        }
+        if let Some(device) = &args.device {
+            put("device", device.as_str().into());
+        }
+        let aovs: Vec<_> = args.aovs().into_iter().map(|aov| aov.name()).collect();
+        put("aov", aovs.join(",").into());
+    }
+
+    /// The reason for the end, as in the header.
+    pub fn stop_text(&self) -> String {
+        match self.stop {
+            Stop::Samples => String::from("samples"),
+            Stop::Time(limit) => format!("time {limit}"),
+            Stop::Noise(limit) => format!("noise {limit}"),
+            Stop::Interrupt => String::from("interrupt"),
+        }
+    }
+}
+
+fn path(path: &Path) -> Value {
+    path.to_string_lossy().into_owned().into()
+}
+
+/// Counts are exact up to 2^53.
+fn count(count: u64) -> Value {
+    Value::Number(count as f64)
+}

@@ -1,0 +1,230 @@
+//! `etendue info`: devices, and what a scene holds and needs.
+
+use std::fmt::Write;
+use std::path::Path;
+
+use etendue::render::{self, DeviceInfo, SceneModel};
+use etendue::scene::{LightKind, Scene, gltf};
+use etendue::settings::Settings;
+use serde_json::{Map, Value as Json, json};
+
+use super::args::InfoArgs;
+use super::failure::{Failure, Outcome};
+use super::stats;
+use super::write_stdout;
+
+/// Prints the devices and, with a scene, its description. Without a scene, having
+/// no device is a failure; with one it is part of the answer.
+pub fn run(args: &InfoArgs) -> Result<Outcome, Failure> {
+    let scene = match &args.scene {
+        Some(path) => Some(load(path)?),
+        None => None,
+    };
+    let devices = render::devices();
+    let text = if args.json {
+        let mut root = json!({ "version": env!("CARGO_PKG_VERSION") });
+        match &devices {
+            Ok(devices) => root["devices"] = devices.iter().map(device_json).collect(),
+            Err(error) => {
+                root["devices"] = json!([]);
+                root["devices_error"] = error.to_string().into();
+            }
+        }
+        if let (Some(path), Some((scene, model))) = (&args.scene, &scene) {
+            root["scene"] = scene_json(path, scene, model);
+        }
+        format!("{root:#}\n")
+    } else {
+        let mut text = String::new();
+        if let (Some(path), Some((scene, model))) = (&args.scene, &scene) {
+            write_scene(&mut text, path, scene, model);
+        }
+        match &devices {
+            Ok(devices) => devices.iter().for_each(|d| write_device(&mut text, d)),
+            Err(error) => line(&mut text, &format!("no device: {error}")),
+        }
+        text
+    };
+    match devices {
+        Err(error) if scene.is_none() => {
+            if args.json {
+                write_stdout(&text)?;
+            }
+            Err(error.into())
+        }
+        _ => {
+            write_stdout(&text)?;
+            Ok(Outcome::Done)
+        }
+    }
+}
+
+fn load(path: &Path) -> Result<(Scene, SceneModel), Failure> {
+    let scene = gltf::load(path).map_err(Failure::scene)?;
+    let model = render::model(&scene, &Settings::default())?;
+    Ok((scene, model))
+}
+
+/// What a scene holds, by name.
+fn counts(scene: &Scene) -> [(&'static str, u64); 10] {
+    let lights = |is: fn(&LightKind) -> bool| scene.lights.iter().filter(|l| is(&l.kind)).count();
+    [
+        ("meshes", scene.meshes.len()),
+        ("instances", scene.instances.len()),
+        ("triangles", scene.triangle_count() as usize),
+        ("materials", scene.materials.len()),
+        ("textures", scene.textures.len()),
+        ("lights", scene.lights.len()),
+        ("point_lights", lights(|k| matches!(k, LightKind::Point))),
+        (
+            "spot_lights",
+            lights(|k| matches!(k, LightKind::Spot { .. })),
+        ),
+        (
+            "directional_lights",
+            lights(|k| matches!(k, LightKind::Directional)),
+        ),
+        ("cameras", scene.cameras.len()),
+    ]
+    .map(|(name, count)| (name, count as u64))
+}
+
+fn device_json(device: &DeviceInfo) -> Json {
+    let mut backends = Map::new();
+    for (backend, support) in &device.backends {
+        let object = match support {
+            Ok(()) => json!({ "available": true }),
+            Err(lacks) => json!({ "available": false, "lacks": lacks }),
+        };
+        backends.insert(backend.name().to_owned(), object);
+    }
+    json!({
+        "index": device.index,
+        "name": device.name,
+        "kind": device.kind,
+        "driver": device.driver,
+        "api_version": device.api_version,
+        "subgroup": device.subgroup,
+        "backends": backends,
+    })
+}
+
+fn scene_json(path: &Path, scene: &Scene, model: &SceneModel) -> Json {
+    let counts: Map<_, _> = counts(scene)
+        .into_iter()
+        .map(|(name, count)| (name.to_owned(), count.into()))
+        .collect();
+    let features: Map<_, _> = model
+        .features
+        .iter()
+        .map(|f| (f.name.to_owned(), f.on.into()))
+        .collect();
+    let cameras: Vec<_> = scene.cameras.iter().map(|c| c.name.as_str()).collect();
+    let bounds = scene
+        .bounds()
+        .map(|(low, high)| json!([low.to_array(), high.to_array()]));
+    json!({
+        "path": path.to_string_lossy(),
+        "hash": scene.hash,
+        "counts": counts,
+        "cameras": cameras,
+        "bounds": bounds,
+        "bytes_per_triangle": model.bytes_per_triangle,
+        "memory": stats::memory(&model.memory),
+        "features": features,
+        "warnings": scene.warnings,
+    })
+}
+
+fn write_device(text: &mut String, device: &DeviceInfo) {
+    line(
+        text,
+        &format!(
+            "device {}: {}, {}, Vulkan {}, subgroups of {}",
+            device.index, device.name, device.kind, device.api_version, device.subgroup
+        ),
+    );
+    line(text, &format!("  driver      {}", device.driver));
+    for (backend, support) in &device.backends {
+        let support = match support {
+            Ok(()) => String::from("yes"),
+            Err(lacks) => format!("no: {lacks}"),
+        };
+        line(text, &format!("  {:11} {support}", backend.name()));
+    }
+}
+
+fn write_scene(text: &mut String, path: &Path, scene: &Scene, model: &SceneModel) {
+    line(text, &format!("scene {}", path.display()));
+    for (name, count) in counts(scene) {
+        if count > 0 {
+            line(text, &format!("  {:19} {count}", name.replace('_', " ")));
+        }
+    }
+    for (index, camera) in scene.cameras.iter().enumerate() {
+        line(text, &format!("  camera {index:<12} {}", camera.name));
+    }
+    if let Some((low, high)) = scene.bounds() {
+        line(text, &format!("  bounds              {low} … {high} m"));
+    }
+    let memory = &model.memory;
+    let total = memory.geometry + memory.acceleration + memory.textures + memory.film;
+    line(
+        text,
+        &format!(
+            "  memory estimate     {}: geometry {}, acceleration {}, textures {}, film {}",
+            bytes(total),
+            bytes(memory.geometry),
+            bytes(memory.acceleration),
+            bytes(memory.textures),
+            bytes(memory.film)
+        ),
+    );
+    let per_triangle = model.bytes_per_triangle;
+    line(text, &format!("  bytes per triangle  {per_triangle:.1}"));
+    for (title, on) in [("model", true), ("compiled out", false)] {
+        let features = model.features.iter().filter(|f| f.on == on);
+        let names: Vec<_> = features.map(|f| f.name).collect();
+        line(text, &format!("  {title:19} {}", names.join(", ")));
+    }
+    for warning in &scene.warnings {
+        line(text, &format!("  warning             {warning}"));
+    }
+}
+
+fn line(text: &mut String, line: &str) {
+    writeln!(text, "{}", line.trim_end()).expect("writing to a string cannot fail");
+}
+
+/// Bytes in the largest binary unit that leaves a whole part.
+fn bytes(bytes: u64) -> String {
+    let mut value = bytes as f64;
+    for unit in ["B", "KiB", "MiB", "GiB"] {
+        if value < 1024.0 {
+            return match unit {
+                "B" => format!("{bytes} B"),
+                _ => format!("{value:.1} {unit}"),
+            };
+        }
+        value /= 1024.0;
+    }
+    format!("{value:.1} TiB")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn bytes_have_fitting_units() {
+        let cases = [
+            (0, "0 B"),
+            (1023, "1023 B"),
+            (1536, "1.5 KiB"),
+            (5 << 40, "5.0 TiB"),
+        ];
+        for (count, text) in cases {
+            assert_eq!(bytes(count), text);
+        }
+    }
+}

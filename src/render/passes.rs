@@ -1,0 +1,95 @@
+//! Cuts a range of samples into aligned powers of two, the nodes of the film's
+//! tree: one sample first, so that something is there soon, then doubling as
+//! long as a pass stays short. The cut does not change the bits of the result.
+
+use std::ops::Range;
+
+/// log₂ of the most samples of a pass: what one invocation sums (FILM_LEVELS in film.glsl).
+pub(crate) const MAX_PASS_LEVEL: u32 = 8;
+
+/// The passes that are left.
+pub(crate) struct Passes {
+    start: u64,
+    next: u64,
+    end: u64,
+    current: u32,
+    limit: u32,
+}
+
+impl Passes {
+    /// All of `samples`, at most `max_pass` at a time.
+    pub fn new(samples: Range<u64>, max_pass: u64) -> Self {
+        Self {
+            start: samples.start,
+            next: samples.start,
+            end: samples.end,
+            current: 0,
+            limit: max_pass.max(1).ilog2().min(MAX_PASS_LEVEL),
+        }
+    }
+
+    /// First sample and log₂ of the number of samples of the next pass.
+    pub fn upcoming(&mut self) -> Option<(u64, u32)> {
+        if self.next == self.end {
+            return None;
+        }
+        // A pass starts at a multiple of its size, ends inside the range and is
+        // not larger than what is done already.
+        let aligned = self.next.trailing_zeros();
+        let inside = (self.end - self.next).ilog2();
+        let ramp = (self.done() + 1).ilog2();
+        self.current = aligned.min(inside).min(ramp).min(self.limit);
+        Some((self.next, self.current))
+    }
+
+    /// Notes that the pass is complete and took `seconds`; keeps the next ones below `target` seconds.
+    pub fn finish(&mut self, seconds: f64, target: f64) {
+        self.next += 1 << self.current;
+        if 2.0 * seconds > target {
+            self.limit = self.limit.min(self.current);
+        }
+    }
+
+    /// Samples of complete passes.
+    pub fn done(&self) -> u64 {
+        self.next - self.start
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn passes_tile_the_range_with_aligned_powers_of_two() {
+        for (range, max) in [
+            (0..128, 256),
+            (3..77, 256),
+            (5..6, 4),
+            (0..1000, 1),
+            (7..4096, 64),
+        ] {
+            let mut passes = Passes::new(range.clone(), max);
+            let mut at = range.start;
+            while let Some((first, level)) = passes.upcoming() {
+                assert_eq!(first, at);
+                assert_eq!(first % (1 << level), 0);
+                assert!(1 << level <= max);
+                at += 1 << level;
+                passes.finish(0.0, 1.0);
+            }
+            assert_eq!(at, range.end);
+        }
+    }
+
+    #[test]
+    fn slow_passes_do_not_grow() {
+        let mut passes = Passes::new(0..64, 256);
+        let mut longest = 0;
+        while let Some((_, level)) = passes.upcoming() {
+            longest = longest.max(level);
+            passes.finish(0.3 * f64::from(1 << level), 1.0);
+        }
+        assert_eq!(longest, 1);
+    }
+}

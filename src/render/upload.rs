@@ -1,0 +1,466 @@
+//! Scene → the arrays that the kernels read: the only writer of the shared
+//! structs, apart from the batches.
+
+use glam::{DMat4, DVec3, Vec3};
+
+use super::geometry::Geometry;
+use super::lights::{self, Emitter, LightTable};
+use crate::layout;
+use crate::scene::{
+    AlphaMode, Camera, Environment, Filter, Material, Projection, Scene, Texels, Texture,
+    TextureRef, Wrap,
+};
+use crate::settings::{Estimator, Settings};
+use crate::spec::{self, Spec};
+
+/// Shares of direct light that the environment map gets at least and at most
+/// beside other lights: neither may starve.
+const ENV_CHOICE: (f64, f64) = (0.1, 0.9);
+
+/// Host copies of everything but the acceleration structures.
+pub(crate) struct SceneData {
+    pub spec: Spec,
+    pub geometry: Geometry,
+    pub params: layout::Params,
+    pub instances: Vec<layout::Instance>,
+    pub materials: Vec<layout::Material>,
+    pub texture_uses: Vec<layout::TextureUse>,
+    pub texels: Vec<u32>,
+    pub lights: Vec<layout::Light>,
+    pub env_map: Vec<[f32; 4]>,
+    pub env_table: Vec<layout::EnvTexel>,
+}
+
+impl SceneData {
+    /// Prepares the scene for the settings; `copy_limit` as in [`super::geometry::DEFAULT_COPY_LIMIT`].
+    pub fn new(scene: &Scene, settings: &Settings, copy_limit: usize) -> Self {
+        let geometry = Geometry::new(scene, copy_limit);
+        let mut spec = Spec::for_scene(scene, settings);
+        spec.normals =
+            geometry.has_normals || scene.materials.iter().any(|m| m.normal_texture.is_some());
+        spec.attributes = !geometry.attributes.is_empty();
+        spec.instances = geometry.has_instances();
+
+        let (texels, first_texels) = texels(&scene.textures);
+        let mut data = Self {
+            spec,
+            params: params(scene, settings, &geometry),
+            instances: instances(&geometry),
+            materials: Vec::new(),
+            texture_uses: Vec::new(),
+            texels,
+            lights: Vec::new(),
+            env_map: Vec::new(),
+            env_table: Vec::new(),
+            geometry,
+        };
+        let emissions: Vec<f64> = scene
+            .materials
+            .iter()
+            .map(|m| mean_emission(m, &scene.textures))
+            .collect();
+        data.add_materials(scene, &first_texels);
+        let env_power = data.add_environment(scene);
+        data.add_lights(scene, settings, &emissions, env_power);
+        data
+    }
+
+    /// Bytes of textures and environment maps on the device.
+    pub fn texture_bytes(&self) -> u64 {
+        (4 * self.texels.len() + 16 * self.env_map.len() + 12 * self.env_table.len()) as u64
+    }
+
+    fn add_materials(&mut self, scene: &Scene, first_texels: &[u32]) {
+        for m in &scene.materials {
+            let mut record = material(m);
+            if spec::has_textures(m) {
+                record.flags |= layout::MATERIAL_HAS_TEXTURES;
+                record.first_texture = self.texture_uses.len() as u32;
+                let emission = if m.unlit {
+                    m.base_color_texture
+                } else {
+                    m.emission_texture
+                };
+                let slots = [
+                    m.base_color_texture,
+                    m.metallic_roughness_texture,
+                    m.normal_texture,
+                    emission,
+                    m.specular_texture,
+                    m.specular_color_texture,
+                ];
+                self.texture_uses
+                    .extend(slots.map(|slot| texture_use(slot, &scene.textures, first_texels)));
+            }
+            self.materials.push(record);
+        }
+    }
+
+    /// The map with its table; returns its power into the scene, or 0 where there is none.
+    fn add_environment(&mut self, scene: &Scene) -> f64 {
+        self.spec.environment = false;
+        match &scene.environment {
+            None => 0.0,
+            Some(Environment::Constant(radiance)) => {
+                self.params.env_radiance = radiance.to_array();
+                0.0
+            }
+            Some(Environment::Map {
+                width,
+                height,
+                texels,
+                intensity,
+                rotation,
+            }) => {
+                let Some((table, mean)) =
+                    lights::environment_table(*width as usize, *height as usize, texels)
+                else {
+                    return 0.0;
+                };
+                self.spec.environment = *intensity > 0.0;
+                self.params.env_radiance = [*intensity; 3];
+                self.params.env_width = *width;
+                self.params.env_height = *height;
+                self.params.env_cos_rotation = f64::from(*rotation).cos() as f32;
+                self.params.env_sin_rotation = f64::from(*rotation).sin() as f32;
+                self.env_map = texels.iter().map(|t| [t[0], t[1], t[2], 0.0]).collect();
+                self.env_table = table;
+                let radius = self.geometry.radius;
+                4.0 * std::f64::consts::PI.powi(2) * radius * radius * mean * f64::from(*intensity)
+            }
+        }
+    }
+
+    fn add_lights(
+        &mut self,
+        scene: &Scene,
+        settings: &Settings,
+        emissions: &[f64],
+        env_power: f64,
+    ) {
+        let mut emitters = self.emissive_triangles(scene, emissions);
+        self.spec.area_lights = !emitters.is_empty();
+        let triangles = emitters.len();
+        for light in &scene.lights {
+            let position = (light.position - self.geometry.origin).as_vec3();
+            emitters.extend(lights::punctual(light, position, self.geometry.radius));
+        }
+        self.spec.punctual = emitters.len() > triangles;
+
+        let is_uniform = settings.estimator == Estimator::Textbook;
+        let count = emitters.len();
+        let LightTable { lights, total } = lights::table(emitters, is_uniform);
+        self.lights = lights;
+        self.params.light_count = count as u32;
+        self.params.light_uniform = if is_uniform && count > 0 {
+            1.0 / count as f32
+        } else {
+            0.0
+        };
+        for (record, emission) in self.materials.iter_mut().zip(emissions) {
+            // Power of one side of a unit area, as in `emissive_triangles`.
+            let sides = sides(record.flags);
+            let density = std::f64::consts::PI * emission * sides / total;
+            record.emission_pdf = if *emission > 0.0 && count > 0 {
+                density as f32
+            } else {
+                0.0
+            };
+        }
+        let env_choice = match (self.spec.environment, count) {
+            (false, _) => 0.0,
+            (true, 0) => 1.0,
+            (true, _) if is_uniform => 1.0 / (count + 1) as f64,
+            (true, _) => (env_power / (env_power + total)).clamp(ENV_CHOICE.0, ENV_CHOICE.1),
+        };
+        self.params.env_choice = env_choice as f32;
+        self.params.table_choice = 1.0 - self.params.env_choice;
+    }
+
+    /// Every placed triangle that emits, with its power: π · radiance · area · sides.
+    fn emissive_triangles(&self, scene: &Scene, emissions: &[f64]) -> Vec<Emitter> {
+        let mut emitters = Vec::new();
+        for (index, placement) in self.geometry.placements.iter().enumerate() {
+            for triangle in self.geometry.groups[placement.group].triangles.clone() {
+                let material =
+                    self.geometry.triangles[triangle][3] & layout::TRIANGLE_MATERIAL_MASK;
+                let emission = emissions[material as usize];
+                if emission <= 0.0 {
+                    continue;
+                }
+                let [a, b, c] = self
+                    .geometry
+                    .corners(triangle)
+                    .map(|p| placement.world_from_object.transform_point3(p.as_dvec3()));
+                let area = 0.5 * (b - a).cross(c - a).length();
+                let both = scene.materials[material as usize].double_sided
+                    || scene.materials[material as usize].unlit;
+                let power = std::f64::consts::PI * emission * area * if both { 2.0 } else { 1.0 };
+                if power > 0.0 {
+                    let light = layout::Light {
+                        kind: layout::LIGHT_TRIANGLE,
+                        instance: index as u32,
+                        triangle: triangle as u32,
+                        ..Default::default()
+                    };
+                    emitters.push(Emitter { light, power });
+                }
+            }
+        }
+        emitters
+    }
+}
+
+fn sides(flags: u32) -> f64 {
+    if flags & layout::MATERIAL_DOUBLE_SIDED != 0 {
+        2.0
+    } else {
+        1.0
+    }
+}
+
+/// Radiance of a material averaged over its texture, as a scalar for sampling.
+fn mean_emission(m: &Material, textures: &[Texture]) -> f64 {
+    if !spec::is_emissive(m) {
+        return 0.0;
+    }
+    let (factor, texture) = if m.unlit {
+        (m.base_color.truncate(), m.base_color_texture)
+    } else {
+        (m.emission, m.emission_texture)
+    };
+    let mean = texture.map_or(Vec3::ONE, |t| mean_texel(&textures[t.texture as usize]));
+    lights::sampling_weight(factor * mean)
+}
+
+/// Mean colour of a texture, linear.
+fn mean_texel(texture: &Texture) -> Vec3 {
+    let mut sum = DVec3::ZERO;
+    let count = match &texture.texels {
+        Texels::Rgba8 { data, srgb } => {
+            let decode = |v: u8| {
+                f64::from(if *srgb {
+                    srgb_to_linear(v)
+                } else {
+                    f32::from(v) / 255.0
+                })
+            };
+            for t in data.chunks_exact(4) {
+                sum += DVec3::new(decode(t[0]), decode(t[1]), decode(t[2]));
+            }
+            data.len() / 4
+        }
+        Texels::Rgba16(data) => {
+            for t in data.chunks_exact(4) {
+                sum += DVec3::new(t[0].into(), t[1].into(), t[2].into()) / 65_535.0;
+            }
+            data.len() / 4
+        }
+    };
+    (sum / count.max(1) as f64).as_vec3()
+}
+
+/// An sRGB byte as linear light (IEC 61966-2-1).
+fn srgb_to_linear(byte: u8) -> f32 {
+    let v = f64::from(byte) / 255.0;
+    let linear = if v <= 0.04045 {
+        v / 12.92
+    } else {
+        ((v + 0.055) / 1.055).powf(2.4)
+    };
+    linear as f32
+}
+
+fn material(m: &Material) -> layout::Material {
+    let mut flags = 0;
+    let mut alpha_cutoff = 0.0;
+    if m.double_sided || m.unlit {
+        flags |= layout::MATERIAL_DOUBLE_SIDED;
+    }
+    match m.alpha_mode {
+        AlphaMode::Opaque => {}
+        AlphaMode::Mask { cutoff } => {
+            flags |= layout::MATERIAL_MASK;
+            alpha_cutoff = cutoff;
+        }
+        AlphaMode::Blend => flags |= layout::MATERIAL_BLEND,
+    }
+    // The index enters through normal incidence alone; 0 stands for an infinite one.
+    let f0 = if m.ior == 0.0 {
+        1.0
+    } else {
+        ((m.ior - 1.0) / (m.ior + 1.0)).powi(2)
+    };
+    let mut record = layout::Material {
+        base_color: m.base_color.truncate().to_array(),
+        flags,
+        emission: m.emission.to_array(),
+        alpha: m.base_color.w,
+        alpha_cutoff,
+        metallic: m.metallic,
+        roughness: m.roughness,
+        specular_f0: (f0 * m.specular_color).to_array(),
+        specular: m.specular,
+        normal_scale: m.normal_scale,
+        ..Default::default()
+    };
+    if m.unlit {
+        record.flags |= layout::MATERIAL_UNLIT;
+        record.emission = record.base_color;
+        record.metallic = 0.0;
+        record.specular = 0.0;
+    }
+    record
+}
+
+fn texture_use(
+    slot: Option<TextureRef>,
+    textures: &[Texture],
+    first: &[u32],
+) -> layout::TextureUse {
+    let Some(slot) = slot else {
+        return layout::TextureUse {
+            first_texel: layout::NONE,
+            ..Default::default()
+        };
+    };
+    let texture = &textures[slot.texture as usize];
+    let format = match texture.texels {
+        Texels::Rgba8 { srgb: false, .. } => layout::FORMAT_RGBA8,
+        Texels::Rgba8 { srgb: true, .. } => layout::FORMAT_SRGB8,
+        Texels::Rgba16(_) => layout::FORMAT_RGBA16,
+    };
+    let wrap = texture.wrap.map(|wrap| match wrap {
+        Wrap::Repeat => layout::WRAP_REPEAT,
+        Wrap::Mirror => layout::WRAP_MIRROR,
+        Wrap::Clamp => layout::WRAP_CLAMP,
+    });
+    let filter = match texture.filter {
+        Filter::Nearest => layout::FILTER_NEAREST,
+        Filter::Linear => layout::FILTER_LINEAR,
+    };
+    layout::TextureUse {
+        first_texel: first[slot.texture as usize],
+        width: texture.width,
+        height: texture.height,
+        format: format | wrap[0] << 4 | wrap[1] << 8 | filter << 12,
+        uv_set: slot.uv_set,
+        uv_row_u: slot.uv_transform[0],
+        uv_row_v: slot.uv_transform[1],
+    }
+}
+
+/// All textures behind the table of decoded sRGB values, and where each starts.
+fn texels(textures: &[Texture]) -> (Vec<u32>, Vec<u32>) {
+    let mut words: Vec<u32> = (0..=255)
+        .map(|byte| srgb_to_linear(byte).to_bits())
+        .collect();
+    let first = textures
+        .iter()
+        .map(|texture| {
+            let start = words.len() as u32;
+            match &texture.texels {
+                Texels::Rgba8 { data, .. } => {
+                    words.extend(
+                        data.chunks_exact(4)
+                            .map(|t| u32::from_le_bytes([t[0], t[1], t[2], t[3]])),
+                    );
+                }
+                Texels::Rgba16(data) => {
+                    words.extend(
+                        data.chunks_exact(2)
+                            .map(|t| u32::from(t[0]) | u32::from(t[1]) << 16),
+                    );
+                }
+            }
+            start
+        })
+        .collect();
+    (words, first)
+}
+
+fn instances(geometry: &Geometry) -> Vec<layout::Instance> {
+    geometry
+        .placements
+        .iter()
+        .map(|placement| {
+            let columns = |m: &glam::DAffine3| {
+                let a = m.matrix3;
+                [a.x_axis, a.y_axis, a.z_axis, m.translation].map(|v| v.as_vec3().to_array())
+            };
+            let [wx, wy, wz, wt] = columns(&placement.world_from_object);
+            let [ox, oy, oz, ot] = columns(&placement.world_from_object.inverse());
+            layout::Instance {
+                world_from_object_x: wx,
+                world_from_object_y: wy,
+                world_from_object_z: wz,
+                world_from_object_t: wt,
+                object_from_world_x: ox,
+                object_from_world_y: oy,
+                object_from_world_z: oz,
+                object_from_world_t: ot,
+                first_triangle: geometry.groups[placement.group].triangles.start as u32,
+                is_identity: u32::from(placement.group == 0),
+                is_mirrored: u32::from(placement.world_from_object.matrix3.determinant() < 0.0),
+                ..Default::default()
+            }
+        })
+        .collect()
+}
+
+/// Camera, frame and limits; lights and environment are filled in later.
+fn params(scene: &Scene, settings: &Settings, geometry: &Geometry) -> layout::Params {
+    let aspect = f64::from(settings.width) / f64::from(settings.height);
+    let framing;
+    let camera: &Camera = match scene.cameras.get(settings.camera.unwrap_or(0)) {
+        Some(camera) => camera,
+        None => {
+            framing = scene.framing_camera(aspect);
+            &framing
+        }
+    };
+    let pose = DMat4::from(camera.world_from_camera);
+    let (right, up, back) = (
+        pose.x_axis.truncate(),
+        pose.y_axis.truncate(),
+        pose.z_axis.truncate(),
+    );
+    let (half_width, half_height, kind) = match camera.projection {
+        // The vertical angle holds; the width follows from the picture.
+        Projection::Perspective { yfov, .. } => {
+            let half = (0.5 * f64::from(yfov)).tan();
+            (half * aspect, half, layout::CAMERA_PERSPECTIVE)
+        }
+        Projection::Orthographic { ymag, .. } => {
+            let half = f64::from(ymag);
+            (half * aspect, half, layout::CAMERA_ORTHOGRAPHIC)
+        }
+    };
+    let window = settings.window();
+    let (width, height) = (window.x1 - window.x0, window.y1 - window.y0);
+    layout::Params {
+        camera_position: (pose.w_axis.truncate() - geometry.origin)
+            .as_vec3()
+            .to_array(),
+        camera_kind: kind,
+        camera_right: (right * half_width).as_vec3().to_array(),
+        width: settings.width,
+        camera_up: (up * half_height).as_vec3().to_array(),
+        height: settings.height,
+        camera_forward: (-back).as_vec3().to_array(),
+        window_x: window.x0,
+        window_y: window.y0,
+        window_width: width,
+        window_height: height,
+        tiles_x: width.div_ceil(layout::TILE),
+        tiles_y: height.div_ceil(layout::TILE),
+        seed_low: settings.seed as u32,
+        seed_high: (settings.seed >> 32) as u32,
+        max_depth: if settings.max_depth == 0 {
+            layout::NONE
+        } else {
+            settings.max_depth
+        },
+        ..Default::default()
+    }
+}

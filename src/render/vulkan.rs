@@ -1,0 +1,597 @@
+//! The Vulkan side of a render: buffers, pipeline, batches. The two traversals
+//! differ in one buffer or structure and in which module is compiled.
+
+use std::ops::Range;
+use std::sync::Arc;
+
+use glam::Vec3;
+
+use super::upload::SceneData;
+use super::{DeviceOptions, Ledger, Memory};
+use crate::bvh::{Bvh, GroupDesc, InstanceDesc, Quality};
+use crate::error::{Error, Result};
+use crate::gpu::{
+    self, BindSet, BindingKind, Blas, BlasGeometry, Buffer, ComputePipeline, Device, DeviceKind,
+    DeviceRequest, PipelineDesc, Resource, TexelFormat, Tlas, TlasInstance, Usage,
+};
+use crate::layout::{self, ProbeHit, ProbeRay};
+use crate::settings::BackendChoice;
+use crate::spec;
+
+const NODE_FORMAT: TexelFormat = TexelFormat::Rgba32Uint;
+const RECORD_FORMAT: TexelFormat = TexelFormat::Rgba32Float;
+/// Invocations of a probe's work group.
+const PROBE_GROUP: u32 = 64;
+
+/// Opens the device that can run the choice; says which traversal and why.
+pub(super) fn open(
+    choice: BackendChoice,
+    options: &DeviceOptions,
+) -> Result<(Arc<Device>, BackendChoice, String)> {
+    let request = |ray_query| DeviceRequest {
+        select: options.device.as_deref(),
+        validation: options.validation,
+        ray_query,
+    };
+    match choice {
+        BackendChoice::RayQuery => Ok((
+            Device::open(&request(true))?,
+            BackendChoice::RayQuery,
+            String::from("as asked"),
+        )),
+        BackendChoice::Bvh => Ok((
+            Device::open(&request(false))?,
+            BackendChoice::Bvh,
+            String::from("as asked"),
+        )),
+        BackendChoice::Auto => {
+            let device = Device::open(&request(false))?;
+            let caps = device.caps();
+            if caps.ray_hardware_likely {
+                drop(device);
+                let device = Device::open(&request(true))?;
+                let reason = String::from("the device has ray query in hardware");
+                return Ok((device, BackendChoice::RayQuery, reason));
+            }
+            let reason = match &caps.ray_query {
+                Err(missing) => format!("the device lacks {missing}"),
+                Ok(()) => String::from("ray query on a CPU is slower than our own tree"),
+            };
+            Ok((device, BackendChoice::Bvh, reason))
+        }
+    }
+}
+
+/// The own tree of a scene.
+pub(super) fn build_bvh(data: &SceneData) -> Result<Bvh> {
+    let geometry = &data.geometry;
+    let positions: Vec<Vec<Vec3>> = geometry
+        .groups
+        .iter()
+        .map(|g| {
+            g.triangles
+                .clone()
+                .flat_map(|t| geometry.corners(t))
+                .collect()
+        })
+        .collect();
+    let masked: Vec<Vec<bool>> = geometry
+        .groups
+        .iter()
+        .map(|g| {
+            if !g.has_cutouts {
+                return Vec::new();
+            }
+            geometry.triangles[g.triangles.clone()]
+                .iter()
+                .map(|t| t[3] & layout::TRIANGLE_IS_MASKED != 0)
+                .collect()
+        })
+        .collect();
+    let groups: Vec<GroupDesc> = positions
+        .iter()
+        .zip(&masked)
+        .map(|(positions, masked)| GroupDesc { positions, masked })
+        .collect();
+    let mut instances = Vec::new();
+    if geometry.has_instances() {
+        for (placement, record) in geometry.placements.iter().zip(&data.instances) {
+            instances.push(InstanceDesc {
+                group: placement.group as u32,
+                world_from_object: world_from_object(record),
+                object_from_world: [
+                    record.object_from_world_x,
+                    record.object_from_world_y,
+                    record.object_from_world_z,
+                    record.object_from_world_t,
+                ],
+            });
+        }
+    }
+    Bvh::build(&groups, &instances, Quality::Balanced)
+}
+
+fn world_from_object(record: &layout::Instance) -> [[f32; 3]; 4] {
+    [
+        record.world_from_object_x,
+        record.world_from_object_y,
+        record.world_from_object_z,
+        record.world_from_object_t,
+    ]
+}
+
+/// What answers "what does this ray meet?".
+enum Traversal {
+    Software { nodes: Buffer, records: Buffer },
+    Query { scene: Tlas, bytes: u64 },
+}
+
+impl Traversal {
+    fn bindings(&self) -> Vec<(u32, BindingKind)> {
+        match self {
+            Self::Software { .. } => vec![
+                (layout::BIND_BVH_NODES, BindingKind::Texel),
+                (layout::BIND_BVH_TRIANGLES, BindingKind::Texel),
+            ],
+            Self::Query { .. } => vec![(layout::BIND_SCENE, BindingKind::AccelerationStructure)],
+        }
+    }
+
+    fn resources(&self) -> Vec<(u32, Resource<'_>)> {
+        match self {
+            Self::Software { nodes, records } => vec![
+                (layout::BIND_BVH_NODES, Resource::Buffer(nodes)),
+                (layout::BIND_BVH_TRIANGLES, Resource::Buffer(records)),
+            ],
+            Self::Query { scene, .. } => vec![(layout::BIND_SCENE, Resource::Acceleration(scene))],
+        }
+    }
+
+    fn bytes(&self) -> u64 {
+        match self {
+            Self::Software { nodes, records } => nodes.bytes() + records.bytes(),
+            Self::Query { bytes, .. } => *bytes,
+        }
+    }
+}
+
+/// Rows of tiles whose film fits one buffer.
+pub(super) struct Band {
+    pub tiles: Range<u32>,
+    /// Pixels of the window, row by row.
+    pub pixels: Range<u32>,
+}
+
+/// Some tiles, an aligned power of two of samples.
+pub(super) struct Batch {
+    pub first_sample: u64,
+    pub samples: u32,
+    pub tiles: Range<u32>,
+    pub film_first_pixel: u32,
+}
+
+/// A scene on a device, ready to render batches.
+pub(super) struct VulkanBackend {
+    device: Arc<Device>,
+    traversal: Traversal,
+    params: layout::Params,
+    spec: spec::Spec,
+    /// Everything that both kernels read, with its binding.
+    shared: Vec<(u32, BindingKind, Buffer)>,
+    film: Buffer,
+    ledger: Buffer,
+    pipeline: ComputePipeline,
+    set: BindSet,
+    workers: u32,
+    memory: Memory,
+}
+
+impl VulkanBackend {
+    pub fn new(device: &Arc<Device>, choice: BackendChoice, data: &SceneData) -> Result<Self> {
+        let mut params = data.params;
+        let mut instances = data.instances.clone();
+        let vertices = texel(
+            device,
+            "vertices",
+            TexelFormat::Rgba32Float,
+            &data.geometry.vertices,
+            choice == BackendChoice::RayQuery,
+        )?;
+        let traversal = match choice {
+            BackendChoice::RayQuery => build_query(device, data, &vertices)?,
+            _ => {
+                let bvh = build_bvh(data)?;
+                params.bvh_root = bvh.root;
+                for (record, placement) in instances.iter_mut().zip(&data.geometry.placements) {
+                    record.bvh_root = bvh.groups[placement.group].root;
+                    record.bvh_first_triangle = bvh.groups[placement.group].first_triangle;
+                }
+                upload_bvh(device, &bvh)?
+            }
+        };
+        let storage = BindingKind::Storage;
+        let shared = vec![
+            (
+                layout::BIND_PARAMS,
+                BindingKind::Uniform,
+                Buffer::from_slice(device, "params", Usage::UNIFORM, &[params])?,
+            ),
+            (
+                layout::BIND_INSTANCES,
+                storage,
+                upload(device, "instances", &instances)?,
+            ),
+            (
+                layout::BIND_TRIANGLES,
+                BindingKind::Texel,
+                texel(
+                    device,
+                    "triangles",
+                    TexelFormat::Rgba32Uint,
+                    &data.geometry.triangles,
+                    false,
+                )?,
+            ),
+            (layout::BIND_VERTICES, BindingKind::Texel, vertices),
+            (
+                layout::BIND_ATTRIBUTES,
+                BindingKind::Texel,
+                texel(
+                    device,
+                    "attributes",
+                    TexelFormat::Rgba32Float,
+                    &data.geometry.attributes,
+                    false,
+                )?,
+            ),
+            (
+                layout::BIND_MATERIALS,
+                storage,
+                upload(device, "materials", &data.materials)?,
+            ),
+            (
+                layout::BIND_TEXTURE_USES,
+                storage,
+                upload(device, "texture uses", &data.texture_uses)?,
+            ),
+            (
+                layout::BIND_TEXELS,
+                BindingKind::Texel,
+                texel(device, "texels", TexelFormat::R32Uint, &data.texels, false)?,
+            ),
+            (
+                layout::BIND_LIGHTS,
+                storage,
+                upload(device, "lights", &data.lights)?,
+            ),
+            (
+                layout::BIND_ENV_MAP,
+                BindingKind::Texel,
+                texel(
+                    device,
+                    "environment map",
+                    TexelFormat::Rgba32Float,
+                    &data.env_map,
+                    false,
+                )?,
+            ),
+            (
+                layout::BIND_ENV_TABLE,
+                storage,
+                upload(device, "environment table", &data.env_table)?,
+            ),
+        ];
+
+        let film_bytes = film_bytes(device, &params, data.spec.aovs);
+        let film = Buffer::new(
+            device,
+            "film",
+            film_bytes,
+            Usage::STORAGE,
+            gpu::Memory::DeviceLocal,
+        )?;
+        let ledger = Buffer::new(
+            device,
+            "ledger",
+            u64::from(layout::LEDGER_SIZE) * 4,
+            Usage::STORAGE,
+            gpu::Memory::DeviceLocal,
+        )?;
+        let spirv = match traversal {
+            Traversal::Software { .. } => spec::kernels::PATH_SOFTWARE,
+            Traversal::Query { .. } => spec::kernels::PATH_QUERY,
+        };
+        let mut bindings: Vec<_> = shared.iter().map(|(at, kind, _)| (*at, *kind)).collect();
+        bindings.extend([(layout::BIND_FILM, storage), (layout::BIND_LEDGER, storage)]);
+        bindings.extend(traversal.bindings());
+        let pipeline = ComputePipeline::new(
+            device,
+            &PipelineDesc {
+                name: "path",
+                spirv: &spec::words(spirv),
+                bindings: &bindings,
+                constants: &data.spec.constants(),
+                push_bytes: size_of::<layout::Batch>() as u32,
+            },
+        )?;
+        let mut resources: Vec<_> = shared
+            .iter()
+            .map(|(at, _, buffer)| (*at, Resource::Buffer(buffer)))
+            .collect();
+        resources.extend([
+            (layout::BIND_FILM, Resource::Buffer(&film)),
+            (layout::BIND_LEDGER, Resource::Buffer(&ledger)),
+        ]);
+        resources.extend(traversal.resources());
+        let set = BindSet::new(&pipeline, "path", &resources)?;
+        let memory = Memory {
+            geometry: data.geometry.bytes(),
+            acceleration: traversal.bytes(),
+            textures: data.texture_bytes(),
+            film: film_bytes,
+        };
+        // A CPU driver runs its threads on contiguous runs of work groups.
+        let workers = if device.caps().kind == DeviceKind::Cpu {
+            std::thread::available_parallelism().map_or(1, |n| n.get() as u32)
+        } else {
+            1
+        };
+        Ok(Self {
+            device: Arc::clone(device),
+            traversal,
+            params,
+            spec: data.spec,
+            shared,
+            film,
+            ledger,
+            pipeline,
+            set,
+            workers,
+            memory,
+        })
+    }
+
+    pub fn memory(&self) -> Memory {
+        self.memory
+    }
+
+    pub fn validation_messages(&self) -> Vec<String> {
+        self.device.validation_messages()
+    }
+
+    /// Tiles of the window.
+    pub fn tiles(&self) -> u32 {
+        self.params.tiles_x * self.params.tiles_y
+    }
+
+    /// The window in parts whose film fits the buffer.
+    pub fn bands(&self) -> Vec<Band> {
+        let floats = film_floats(self.spec.aovs);
+        let row_bytes = u64::from(self.params.window_width) * 4 * floats * u64::from(layout::TILE);
+        let rows = ((self.film.bytes() / row_bytes) as u32).max(1);
+        (0..self.params.tiles_y)
+            .step_by(rows as usize)
+            .map(|row| {
+                let end = (row + rows).min(self.params.tiles_y);
+                let pixel_row = |r: u32| {
+                    (r * layout::TILE).min(self.params.window_height) * self.params.window_width
+                };
+                Band {
+                    tiles: row * self.params.tiles_x..end * self.params.tiles_x,
+                    pixels: pixel_row(row)..pixel_row(end),
+                }
+            })
+            .collect()
+    }
+
+    /// Makes the driver compile: no sample is taken.
+    pub fn warm_up(&mut self) -> Result<()> {
+        let batch = Batch {
+            first_sample: 0,
+            samples: 0,
+            tiles: 0..1,
+            film_first_pixel: 0,
+        };
+        self.render(&batch).map(|_| ())
+    }
+
+    /// Renders a batch into the film buffer; returns seconds.
+    pub fn render(&mut self, batch: &Batch) -> Result<f64> {
+        let count = batch.tiles.len() as u32;
+        let push = layout::Batch {
+            first_sample_low: batch.first_sample as u32,
+            first_sample_high: (batch.first_sample >> 32) as u32,
+            sample_count: batch.samples,
+            first_tile: batch.tiles.start,
+            tile_count: count,
+            interleave: self.workers,
+            film_first_pixel: batch.film_first_pixel,
+        };
+        let groups = count.div_ceil(self.workers) * self.workers;
+        let time = self.device.run("path", |commands| {
+            commands.dispatch(
+                &self.pipeline,
+                &self.set,
+                bytemuck::bytes_of(&push),
+                [groups, 1, 1],
+            );
+        })?;
+        Ok(time.wall)
+    }
+
+    /// Appends the film of a band of `pixels`.
+    pub fn read(&self, pixels: usize, values: &mut Vec<f32>) -> Result<()> {
+        let start = values.len();
+        values.resize(start + pixels * film_floats(self.spec.aovs) as usize, 0.0);
+        self.film.read_into(&mut values[start..])
+    }
+
+    pub fn reset_ledger(&self) -> Result<()> {
+        self.ledger.write(0, &[0u32; layout::LEDGER_SIZE as usize])
+    }
+
+    /// Rays traced, and what may have changed the expected value.
+    pub fn ledger(&self) -> Result<(u64, Ledger)> {
+        let words: Vec<u32> = self.ledger.read(layout::LEDGER_SIZE as usize)?;
+        let word = |at: u32| u64::from(words[at as usize]);
+        let pair = |low: u32| word(low) | word(low + 1) << 32;
+        let ledger = Ledger {
+            non_finite: word(layout::LEDGER_NON_FINITE),
+            truncated_paths: word(layout::LEDGER_TRUNCATED),
+            truncated_throughput: pair(layout::LEDGER_THROUGHPUT_LOW) as f64 / 65_536.0,
+        };
+        Ok((pair(layout::LEDGER_RAYS_LOW), ledger))
+    }
+
+    /// What given rays meet.
+    pub fn probe(&self, rays: &[ProbeRay]) -> Result<Vec<ProbeHit>> {
+        let spirv = match self.traversal {
+            Traversal::Software { .. } => spec::kernels::PROBE_SOFTWARE,
+            Traversal::Query { .. } => spec::kernels::PROBE_QUERY,
+        };
+        let storage = BindingKind::Storage;
+        let mut bindings: Vec<_> = self
+            .shared
+            .iter()
+            .map(|(at, kind, _)| (*at, *kind))
+            .collect();
+        bindings.extend([
+            (layout::BIND_PROBE_RAYS, storage),
+            (layout::BIND_PROBE_HITS, storage),
+        ]);
+        bindings.extend(self.traversal.bindings());
+        let pipeline = ComputePipeline::new(
+            &self.device,
+            &PipelineDesc {
+                name: "probe",
+                spirv: &spec::words(spirv),
+                bindings: &bindings,
+                constants: &self.spec.constants(),
+                push_bytes: size_of::<layout::Batch>() as u32,
+            },
+        )?;
+        let input = upload(&self.device, "probe rays", rays)?;
+        let output = Buffer::new(
+            &self.device,
+            "probe hits",
+            (rays.len() * size_of::<ProbeHit>()).max(16) as u64,
+            Usage::STORAGE,
+            gpu::Memory::DeviceLocal,
+        )?;
+        let mut resources: Vec<_> = self
+            .shared
+            .iter()
+            .map(|(at, _, buffer)| (*at, Resource::Buffer(buffer)))
+            .collect();
+        resources.extend([
+            (layout::BIND_PROBE_RAYS, Resource::Buffer(&input)),
+            (layout::BIND_PROBE_HITS, Resource::Buffer(&output)),
+        ]);
+        resources.extend(self.traversal.resources());
+        let set = BindSet::new(&pipeline, "probe", &resources)?;
+        let push = layout::Batch {
+            sample_count: rays.len() as u32,
+            ..Default::default()
+        };
+        let groups = (rays.len() as u32).div_ceil(PROBE_GROUP);
+        self.device.run("probe", |commands| {
+            commands.dispatch(&pipeline, &set, bytemuck::bytes_of(&push), [groups, 1, 1]);
+        })?;
+        output.read(rays.len())
+    }
+}
+
+fn upload<T: bytemuck::Pod>(device: &Arc<Device>, name: &str, data: &[T]) -> Result<Buffer> {
+    let bytes = size_of_val(data) as u64;
+    if bytes > device.caps().max_storage_range {
+        return Err(Error::Unsupported {
+            what: format!("{name} of {bytes} bytes"),
+            missing: format!(
+                "the device binds {} bytes at most",
+                device.caps().max_storage_range
+            ),
+        });
+    }
+    Buffer::from_slice(device, name, Usage::STORAGE, data)
+}
+
+fn texel<T: bytemuck::Pod>(
+    device: &Arc<Device>,
+    name: &str,
+    format: TexelFormat,
+    data: &[T],
+    is_input: bool,
+) -> Result<Buffer> {
+    let usage = Usage::texel(format);
+    let usage = if is_input {
+        usage | Usage::ACCELERATION_INPUT
+    } else {
+        usage
+    };
+    Buffer::from_slice(device, name, usage, data)
+}
+
+fn upload_bvh(device: &Arc<Device>, bvh: &Bvh) -> Result<Traversal> {
+    Ok(Traversal::Software {
+        nodes: texel(device, "bvh nodes", NODE_FORMAT, &bvh.nodes, false)?,
+        records: texel(
+            device,
+            "bvh triangles",
+            RECORD_FORMAT,
+            &bvh.triangles,
+            false,
+        )?,
+    })
+}
+
+fn build_query(device: &Arc<Device>, data: &SceneData, vertices: &Buffer) -> Result<Traversal> {
+    let geometry = &data.geometry;
+    let mut bytes = 0;
+    let mut groups = Vec::with_capacity(geometry.groups.len());
+    for group in &geometry.groups {
+        let triangles: Vec<[u32; 3]> = geometry.triangles[group.triangles.clone()]
+            .iter()
+            .map(|t| [t[0], t[1], t[2]])
+            .collect();
+        let blas = Blas::build(
+            device,
+            "group",
+            &BlasGeometry {
+                vertices,
+                vertex_stride: 32,
+                vertex_count: (geometry.vertices.len() / 2) as u32,
+                triangles: &triangles,
+                opaque: !group.has_cutouts,
+            },
+        )?;
+        bytes += blas.bytes();
+        groups.push(blas);
+    }
+    let instances: Vec<TlasInstance> = geometry
+        .placements
+        .iter()
+        .zip(&data.instances)
+        .map(|(placement, record)| TlasInstance {
+            blas: &groups[placement.group],
+            world_from_object: world_from_object(record),
+        })
+        .collect();
+    let scene = Tlas::build(device, "scene", &instances)?;
+    bytes += scene.bytes();
+    Ok(Traversal::Query { scene, bytes })
+}
+
+fn film_floats(aovs: bool) -> u64 {
+    u64::from(if aovs {
+        layout::FILM_FLOATS_AOV
+    } else {
+        layout::FILM_FLOATS
+    })
+}
+
+/// Bytes of a film of the whole window, or of as many rows of tiles as the device can bind.
+fn film_bytes(device: &Device, params: &layout::Params, aovs: bool) -> u64 {
+    let row = u64::from(params.window_width) * 4 * film_floats(aovs) * u64::from(layout::TILE);
+    let rows = (device.caps().max_storage_range / row).clamp(1, u64::from(params.tiles_y));
+    rows * row
+}

@@ -1,0 +1,140 @@
+//! How a render ends: limits, signals, failures; and what is said on the way.
+
+use std::fs;
+use std::process::{Command, Stdio};
+
+use serde_json::{Value as Json, json};
+
+use super::support::{
+    command, etendue, has_device, list, number, read, render, scene, stderr, text, wait_for_samples,
+};
+
+#[test]
+fn limits_end_a_render_and_stand_in_the_header() {
+    if !has_device() {
+        return;
+    }
+    let folder = scene();
+    let many = "--spp 100000000 --width 16";
+    render(&folder, &format!("-o time.exr {many} --time 0.3"));
+    let image = read(&folder, "time.exr");
+    assert_eq!(text(&image, "ledger.stop"), "time 0.3");
+    let spp = number(&image, "spp");
+    assert!((1.0..1e8).contains(&spp), "{spp}");
+    assert_eq!(text(&image, "settings.samples"), "0..100000000");
+
+    // the noise of one sample here is below the signal: 16 samples are enough, and needed
+    let options = "-o noise.exr --noise 1 --aov stderr";
+    render(&folder, &format!("{options} {many}"));
+    let image = read(&folder, "noise.exr");
+    assert_eq!(text(&image, "ledger.stop"), "noise 1");
+    let spp = number(&image, "spp");
+    assert!((16.0..1e6).contains(&spp), "{spp}");
+    let square = |name: &str| -> f64 {
+        let values = image.channel(name).unwrap().iter();
+        values.map(|&v| f64::from(v) * f64::from(v)).sum()
+    };
+    let noise: f64 = ["stderr.R", "stderr.G", "stderr.B"]
+        .map(square)
+        .iter()
+        .sum();
+    let signal: f64 = ["R", "G", "B"].map(square).iter().sum();
+    assert!(noise <= signal, "{noise} {signal}");
+
+    let output = render(&folder, "-o a.exr --width 8 --time 1000 --height 8");
+    assert!(stderr(&output).contains("--spp raises it"));
+    assert_eq!(number(&read(&folder, "a.exr"), "spp"), 128.0);
+}
+
+#[test]
+fn progress_for_programs_is_json_and_quiet_is_quiet() {
+    if !has_device() {
+        return;
+    }
+    let folder = scene();
+    let output = render(&folder, "-o a.exr --spp 4 --width 16 --progress json");
+    let messages = stderr(&output);
+    let events: Vec<Json> = messages
+        .lines()
+        .map(|line| serde_json::from_str(line).unwrap())
+        .collect();
+    let last = |event: &str| events.iter().rfind(|e| e["event"] == event).unwrap();
+    assert_eq!(last("progress")["samples"], 4);
+    assert_eq!(last("progress")["fraction"], 1.0);
+    assert_eq!(last("done")["outputs"], json!(["a.exr"]));
+
+    let output = render(&folder, "-o a.exr --spp 4 --width 16 -q");
+    assert_eq!(stderr(&output), "");
+}
+
+#[test]
+fn a_failing_output_fails_the_render_but_not_the_others() {
+    if !has_device() {
+        return;
+    }
+    let folder = scene();
+    // writable at the start, a folder at the end
+    let mut child = command(
+        "render scene.gltf -o a.exr -o b.png --spp 100000000 --time 2 --width 16 --progress json",
+        folder.path(),
+    )
+    .stderr(Stdio::piped())
+    .spawn()
+    .unwrap();
+    wait_for_samples(&mut child);
+    fs::create_dir(folder.path().join("a.exr")).unwrap();
+    let output = child.wait_with_output().unwrap();
+    assert_eq!(output.status.code(), Some(1), "{}", stderr(&output));
+    assert_eq!(list(folder.path()), ["a.exr", "b.png", "scene.gltf"]);
+    assert!(stderr(&output).contains("error: write a.exr"));
+}
+
+#[cfg(unix)]
+#[test]
+fn signals_stop_at_a_pass_and_keep_what_is_finished() {
+    if !has_device() {
+        return;
+    }
+    for signal in ["INT", "TERM"] {
+        let folder = scene();
+        let mut child = command(
+            "render scene.gltf -o a.exr --spp 100000000 --width 16 --progress json --stats s.json",
+            folder.path(),
+        )
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+        wait_for_samples(&mut child);
+        let sent = Command::new("sh")
+            .args(["-c", &format!("kill -{signal} {}", child.id())])
+            .status()
+            .unwrap();
+        assert!(sent.success());
+        let output = child.wait_with_output().unwrap();
+        assert_eq!(output.status.code(), Some(130), "{}", stderr(&output));
+        assert_eq!(list(folder.path()), ["a.exr", "s.json", "scene.gltf"]);
+        let image = read(&folder, "a.exr");
+        assert_eq!(text(&image, "ledger.stop"), "interrupt");
+        let spp = number(&image, "spp");
+        assert!((1.0..1e8).contains(&spp), "{spp}");
+    }
+}
+
+#[test]
+fn an_unknown_device_is_named() {
+    if !has_device() {
+        return;
+    }
+    let folder = scene();
+    let output = etendue(
+        "render scene.gltf -o a.exr --device no-such-device",
+        folder.path(),
+    );
+    assert!(
+        matches!(output.status.code(), Some(2 | 4)),
+        "{}",
+        stderr(&output)
+    );
+    assert!(stderr(&output).contains("no-such-device"));
+    assert_eq!(list(folder.path()), ["scene.gltf"]);
+}

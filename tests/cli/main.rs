@@ -1,0 +1,9 @@
+//! The program as its users meet it: exit codes, messages, files.
+#![allow(clippy::unwrap_used, reason = "a step that fails fails the test")]
+#![allow(clippy::print_stderr, reason = "a test that is skipped says so")]
+
+mod ending;
+mod info;
+mod render;
+mod support;
+mod usage;

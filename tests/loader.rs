@@ -1,0 +1,22 @@
+//! The glTF loader: exact arrays from good files, refusals with a reason from
+//! broken ones, and nothing opened outside the scene's folder. All files are
+//! built here.
+#![allow(
+    clippy::unwrap_used,
+    reason = "the lint's exception for tests does not reach their helpers"
+)]
+
+#[path = "loader/broken.rs"]
+mod broken;
+#[path = "loader/broken_shading.rs"]
+mod broken_shading;
+#[path = "loader/builder.rs"]
+mod builder;
+#[path = "loader/geometry.rs"]
+mod geometry;
+#[path = "loader/hostile.rs"]
+mod hostile;
+#[path = "loader/shading.rs"]
+mod shading;
+#[path = "loader/world.rs"]
+mod world;
