@@ -85,9 +85,7 @@ impl Bvh {
             let masked = group.masked.get(index as usize).copied().unwrap_or(false);
             let flags = if masked { RECORD_MASKED } else { 0 };
             let (id, flags) = (f32::from_bits(index), f32::from_bits(flags));
-            [
-                a.x, a.y, a.z, id, b.x, b.y, b.z, flags, c.x, c.y, c.z, 0.0,
-            ]
+            [a.x, a.y, a.z, id, b.x, b.y, b.z, flags, c.x, c.y, c.z, 0.0]
         }));
         self.groups.push(GroupRange {
             root,
@@ -122,7 +120,11 @@ impl Bvh {
         let (first_node, first_record) = (self.nodes.len(), self.triangles.len());
         for (what, count, texels) in [
             ("the BVH's nodes", first_node + topology.nodes.len(), 5),
-            ("the BVH's triangles", first_record + topology.order.len(), 3),
+            (
+                "the BVH's triangles",
+                first_record + topology.order.len(),
+                3,
+            ),
         ] {
             let texels = count as u64 * texels;
             if i32::try_from(texels).is_err() {
@@ -161,8 +163,8 @@ fn quantise(bounds: &Aabb, children: &[Option<Aabb>; 8]) -> Node {
         if low > high {
             continue; // no children
         }
-        let mut exponent = (((high - low) / 255.0).log2().ceil() as i32 + 127)
-            .clamp(MIN_CELL_EXPONENT, 254);
+        let mut exponent =
+            (((high - low) / 255.0).log2().ceil() as i32 + 127).clamp(MIN_CELL_EXPONENT, 254);
         while low + 255.0 * cell(exponent) < high {
             exponent += 1; // the logarithm was rounded down
         }
@@ -201,10 +203,7 @@ fn triangle_box(corners: &[Vec3; 3], index: usize) -> Result<Aabb> {
         return Err(out_of_range(&format!("triangle {index}")));
     }
     let [a, b, c] = *corners;
-    Ok(Aabb::new(
-        a.min(b).min(c).into(),
-        a.max(b).max(c).into(),
-    ))
+    Ok(Aabb::new(a.min(b).min(c).into(), a.max(b).max(c).into()))
 }
 
 /// World box of an instance: that of its group's outermost child boxes, enlarged by what rounding may do to a ray
@@ -238,9 +237,25 @@ fn instance_box(root: &Node, instance: &InstanceDesc, index: usize) -> Result<Aa
     }
     let round = |v: DVec3, outwards: fn(f32) -> f32| v.to_array().map(|x| outwards(x as f32));
     Ok(Aabb::new(
-        round(low, f32::next_down).into(),
-        round(high, f32::next_up).into(),
+        round(low, next_down).into(),
+        round(high, next_up).into(),
     ))
+}
+
+/// The next larger number; `x` is finite. The standard library has it since Rust 1.86.
+pub(super) fn next_up(x: f32) -> f32 {
+    if x == 0.0 {
+        f32::from_bits(1)
+    } else if x > 0.0 {
+        f32::from_bits(x.to_bits() + 1)
+    } else {
+        f32::from_bits(x.to_bits() - 1)
+    }
+}
+
+/// The next smaller number; `x` is finite.
+pub(super) fn next_down(x: f32) -> f32 {
+    -next_up(-x)
 }
 
 fn out_of_range(what: &str) -> Error {

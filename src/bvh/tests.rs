@@ -2,6 +2,7 @@
 
 use glam::{Affine3A, EulerRot, Quat, Vec3};
 
+use super::build::{next_down, next_up};
 use super::topology::{Effort, Topology};
 use super::traverse::{Hit, Ray, closest, closest_exhaustive, occluded};
 use super::*;
@@ -78,7 +79,13 @@ fn ray(origin: Vec3, direction: Vec3) -> Ray {
 /// Compares both traversals with brute force and returns the number of hits. Distances may differ by `tolerance`.
 /// Ids must be equal unless the second triangle is within the tolerance as well, and a hit may be lost or found
 /// only where it grazes: where the ray moved sideways by the tolerance decides otherwise.
-fn compare(bvh: &Bvh, rays: usize, tolerance: f32, random: &mut Random, is_opaque: traverse::IsOpaque) -> usize {
+fn compare(
+    bvh: &Bvh,
+    rays: usize,
+    tolerance: f32,
+    random: &mut Random,
+    is_opaque: traverse::IsOpaque,
+) -> usize {
     let mut hits = 0;
     for _ in 0..rays {
         let mut ray = ray(random.cube() * 1.5, random.direction());
@@ -96,7 +103,11 @@ fn compare(bvh: &Bvh, rays: usize, tolerance: f32, random: &mut Random, is_opaqu
         };
         if let (Some(a), Some(b)) = (found, expected) {
             if agree(found, expected) && second - f64::from(b.t) > f64::from(2.0 * tolerance) {
-                assert_eq!((a.instance, a.primitive), (b.instance, b.primitive), "{ray:?}");
+                assert_eq!(
+                    (a.instance, a.primitive),
+                    (b.instance, b.primitive),
+                    "{ray:?}"
+                );
                 hits += 1;
             }
         }
@@ -114,7 +125,8 @@ fn compare(bvh: &Bvh, rays: usize, tolerance: f32, random: &mut Random, is_opaqu
             "{ray:?}: {found:?} instead of {expected:?}"
         );
     }
-    eprintln!("HITS {hits} of {rays}"); hits
+    eprintln!("HITS {hits} of {rays}");
+    hits
 }
 
 #[test]
@@ -237,17 +249,33 @@ fn one_triangle() {
     for (t_min, t_max, expected) in [
         (0.0, 2.0, false),
         (2.0, 9.0, false),
-        (0.0, 2.0f32.next_up(), true),
-        (2.0f32.next_down(), 9.0, true),
+        (0.0, next_up(2.0), true),
+        (next_down(2.0), 9.0, true),
     ] {
-        let ray = Ray { t_min, t_max, ..down };
+        let ray = Ray {
+            t_min,
+            t_max,
+            ..down
+        };
         assert_eq!(closest(&bvh, &ray, &opaque).is_some(), expected);
         assert_eq!(occluded(&bvh, &ray, &opaque), expected);
     }
     // Seen from behind, along the plane, past the edge.
-    assert!(occluded(&bvh, &ray(Vec3::new(0.25, 0.5, -2.0), Vec3::Z), &opaque));
-    assert!(!occluded(&bvh, &ray(Vec3::new(0.25, 0.5, 0.0), Vec3::X), &opaque));
-    assert!(!occluded(&bvh, &ray(Vec3::new(0.6, 0.5, 2.0), Vec3::NEG_Z), &opaque));
+    assert!(occluded(
+        &bvh,
+        &ray(Vec3::new(0.25, 0.5, -2.0), Vec3::Z),
+        &opaque
+    ));
+    assert!(!occluded(
+        &bvh,
+        &ray(Vec3::new(0.25, 0.5, 0.0), Vec3::X),
+        &opaque
+    ));
+    assert!(!occluded(
+        &bvh,
+        &ray(Vec3::new(0.6, 0.5, 2.0), Vec3::NEG_Z),
+        &opaque
+    ));
 }
 
 #[test]
@@ -276,7 +304,11 @@ fn degenerate_sets_are_built_and_never_lost() {
         assert_eq!(closest(&bvh, &down, &opaque).map(|hit| hit.t), Some(2.5));
     }
     let none = single(&points);
-    assert!(!occluded(&none, &ray(Vec3::ZERO, Vec3::ONE.normalize()), &opaque));
+    assert!(!occluded(
+        &none,
+        &ray(Vec3::ZERO, Vec3::ONE.normalize()),
+        &opaque
+    ));
 }
 
 #[test]
@@ -323,7 +355,12 @@ fn building_twice_gives_the_same() {
 
 #[test]
 fn bad_coordinates_are_refused() {
-    for bad in [f32::NAN, f32::INFINITY, -f32::INFINITY, 2.0 * MAX_COORDINATE] {
+    for bad in [
+        f32::NAN,
+        f32::INFINITY,
+        -f32::INFINITY,
+        2.0 * MAX_COORDINATE,
+    ] {
         let positions = [Vec3::ZERO, Vec3::X, Vec3::new(0.0, bad, 0.0)];
         let group = GroupDesc {
             positions: &positions,
@@ -377,26 +414,68 @@ fn time_tmp() {
     let nested: Vec<_> = (0..600)
         .flat_map(|i| [Vec3::ZERO, Vec3::X, Vec3::Y].map(|v| v * 1.1f32.powi(i - 350)))
         .collect();
-    for (name, positions) in [("identical", &identical), ("points", &points), ("nested", &nested)] {
+    for (name, positions) in [
+        ("identical", &identical),
+        ("points", &points),
+        ("nested", &nested),
+    ] {
         for q in [Quality::Fast, Quality::Balanced] {
-        let t = std::time::Instant::now();
-        let bvh = Bvh::build(&[GroupDesc { positions, masked: &[] }], &[], q).unwrap();
-        eprintln!("{name} {q:?} {:.2} s {} nodes", t.elapsed().as_secs_f64(), bvh.nodes.len());
-        let t = std::time::Instant::now();
-        bvh.validate().unwrap();
-        eprintln!("   validate {:.2}", t.elapsed().as_secs_f64());
+            let t = std::time::Instant::now();
+            let bvh = Bvh::build(
+                &[GroupDesc {
+                    positions,
+                    masked: &[],
+                }],
+                &[],
+                q,
+            )
+            .unwrap();
+            eprintln!(
+                "{name} {q:?} {:.2} s {} nodes",
+                t.elapsed().as_secs_f64(),
+                bvh.nodes.len()
+            );
+            let t = std::time::Instant::now();
+            bvh.validate().unwrap();
+            eprintln!("   validate {:.2}", t.elapsed().as_secs_f64());
         }
     }
     // terrain + soup of 1e6
     let n = 708;
-    let h = |i: usize, j: usize| { let (x, y) = (i as f32 / 30., j as f32 / 30.); Vec3::new(x, (x.sin() * y.cos()) + 0.1 * (7. * x).sin() * (5.0 * y).cos() , y) };
+    let h = |i: usize, j: usize| {
+        let (x, y) = (i as f32 / 30., j as f32 / 30.);
+        Vec3::new(
+            x,
+            (x.sin() * y.cos()) + 0.1 * (7. * x).sin() * (5.0 * y).cos(),
+            y,
+        )
+    };
     let mut terrain = vec![];
-    for i in 0..n { for j in 0..n { terrain.extend([h(i, j), h(i + 1, j), h(i, j + 1), h(i + 1, j), h(i + 1, j + 1), h(i, j + 1)]); } }
+    for i in 0..n {
+        for j in 0..n {
+            terrain.extend([
+                h(i, j),
+                h(i + 1, j),
+                h(i, j + 1),
+                h(i + 1, j),
+                h(i + 1, j + 1),
+                h(i, j + 1),
+            ]);
+        }
+    }
     let soup = soup(1_000_000, 0.01, &mut random);
     for (name, positions) in [("terrain", &terrain), ("soup", &soup)] {
         for q in [Quality::Fast, Quality::Balanced, Quality::Best] {
             let t = std::time::Instant::now();
-            let bvh = Bvh::build(&[GroupDesc { positions, masked: &[] }], &[], q).unwrap();
+            let bvh = Bvh::build(
+                &[GroupDesc {
+                    positions,
+                    masked: &[],
+                }],
+                &[],
+                q,
+            )
+            .unwrap();
             let build = t.elapsed().as_secs_f64();
             let mut r = Random(9);
             let t = std::time::Instant::now();
@@ -405,7 +484,12 @@ fn time_tmp() {
                 let p = positions[r.index(positions.len())] + r.cube() * 0.5 + Vec3::Y * 0.6;
                 hits += closest(&bvh, &ray(p, r.direction()), &opaque).is_some() as u32;
             }
-            eprintln!("{name} {q:?} {} tris: build {build:.2} s, {:.1} B/tri, {:.2} Mray/s, {hits} hits", positions.len() / 3, bvh.bytes_per_triangle(), 0.2 / t.elapsed().as_secs_f64());
+            eprintln!(
+                "{name} {q:?} {} tris: build {build:.2} s, {:.1} B/tri, {:.2} Mray/s, {hits} hits",
+                positions.len() / 3,
+                bvh.bytes_per_triangle(),
+                0.2 / t.elapsed().as_secs_f64()
+            );
         }
     }
 }
