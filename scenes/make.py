@@ -75,9 +75,9 @@ def veach():
         metal = gltf.material(f"α = {alpha}", (0.5, 0.5, 0.5), 1, round(math.sqrt(alpha), 6))
         gltf.node(f"plate, α = {alpha}", mesh=gltf.mesh(f"plate, α = {alpha}", (plate, metal)))
     ball = gltf.geometry(icosphere(2))
-    # The row's radiance goes with 1/radius², so that each sphere has the same power.
+    # The row's radiance goes with 1/radius², so that its spheres have equal power; the fill light has eight times that.
     row = [((x, 0, 0), r, 1 / r**2) for x, r in ((-3.75, 1 / 30), (-1.25, 0.1), (1.25, 0.3), (3.75, 0.9))]
-    for i, (center, radius, radiance) in enumerate([*row, ((10, 10, 4), 0.5, 400)]):
+    for i, (center, radius, radiance) in enumerate([*row, ((6, 5, 8), 0.5, 32)]):
         name = "fill light" if i == len(row) else f"light {i + 1}"
         glow = gltf.emitter(name, [round(radiance, 4)] * 3)
         gltf.node(name, mesh=gltf.mesh(name, (ball, glow)), translation=center, scale=[radius] * 3)
@@ -142,7 +142,7 @@ def sun():
     paint = gltf.material("red paint", (0.55, 0.03, 0.03), 0, 0.15)
     gold = gltf.material("rough gold", (1.0, 0.77, 0.34), 1, 0.35)
     mirror = gltf.material("mirror", (0.95, 0.95, 0.95), 1, 0)
-    plane = quad([(-60, 0, -60), (60, 0, -60), (60, 0, 60), (-60, 0, 60)], (0, 1, 0))
+    plane = quad([(-600, 0, -600), (600, 0, -600), (600, 0, 600), (-600, 0, 600)], (0, 1, 0))
     gltf.node("ground", mesh=gltf.mesh("ground", (plane, ground)))
     ball = gltf.geometry(globe(64, 32))
     for name, material, place, radius in [
