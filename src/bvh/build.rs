@@ -235,27 +235,10 @@ fn instance_box(root: &Node, instance: &InstanceDesc, index: usize) -> Result<Aa
     if !(low.min_element() >= -limit && high.max_element() <= limit) {
         return Err(out_of_range(&format!("instance {index}")));
     }
-    let round = |v: DVec3, outwards: fn(f32) -> f32| v.to_array().map(|x| outwards(x as f32));
-    Ok(Aabb::new(
-        round(low, next_down).into(),
-        round(high, next_up).into(),
-    ))
-}
-
-/// The next larger number; `x` is finite. The standard library has it since Rust 1.86.
-pub(super) fn next_up(x: f32) -> f32 {
-    if x == 0.0 {
-        f32::from_bits(1)
-    } else if x > 0.0 {
-        f32::from_bits(x.to_bits() + 1)
-    } else {
-        f32::from_bits(x.to_bits() - 1)
-    }
-}
-
-/// The next smaller number; `x` is finite.
-pub(super) fn next_down(x: f32) -> f32 {
-    -next_up(-x)
+    // Twice the rounding of the conversion, outwards.
+    let slack = |v: DVec3| v.abs() * f64::from(f32::EPSILON) + f64::from(f32::MIN_POSITIVE);
+    let (low, high) = ((low - slack(low)).as_vec3(), (high + slack(high)).as_vec3());
+    Ok(Aabb::new(low.into(), high.into()))
 }
 
 fn out_of_range(what: &str) -> Error {

@@ -1,6 +1,8 @@
 //! Which things lie together in which node. obvhs decides; where its tree is too
 //! deep for the traversal stack, a balanced one is built instead.
 
+use std::time::Duration;
+
 use glam::Vec3A;
 use obvhs::BvhBuildParams;
 use obvhs::aabb::Aabb;
@@ -21,9 +23,10 @@ pub(super) enum Effort {
 impl Effort {
     fn params(self) -> BvhBuildParams {
         let preset = match self {
-            Self::Group(Quality::Fast) => BvhBuildParams::fastest_build(),
-            Self::Group(Quality::Balanced) => BvhBuildParams::fast_build(),
-            Self::Group(Quality::Best) | Self::TopLevel => BvhBuildParams::very_slow_build(),
+            Self::Group(Quality::Fast) => BvhBuildParams::very_fast_build(),
+            Self::Group(Quality::Balanced) => BvhBuildParams::medium_build(),
+            Self::Group(Quality::Best) => BvhBuildParams::slow_build(),
+            Self::TopLevel => BvhBuildParams::very_slow_build(),
         };
         BvhBuildParams {
             // Each triangle is in one leaf only: records are not duplicated and boxes contain them.
@@ -39,6 +42,15 @@ impl Effort {
 
 /// Records in a leaf at most: what the node's unary count holds.
 const MAX_LEAF: usize = 3;
+
+/// Disturbance of a box relative to its longest side: does not change which tree is good.
+const DISTURB_SIZE: f32 = 1.0 / 1024.0;
+/// Disturbance relative to its coordinates: a few times their rounding.
+const DISTURB_REACH: f32 = 1.0 / (1 << 21) as f32;
+/// Disturbance in metres of a point at the origin: areas stay normal numbers.
+const DISTURB_LEAST: f32 = 1e-14;
+/// Bytes of address space for the builder's stack: enough for a chain of a million.
+const BUILD_STACK: usize = 512 << 20;
 
 /// What a slot of a node holds.
 pub(super) enum Slot {
@@ -66,11 +78,7 @@ impl Topology {
                 order: Vec::new(),
             };
         }
-        let built = build_cwbvh(boxes, effort.params(), &mut std::time::Duration::default());
-        let topology = Self {
-            nodes: built.nodes,
-            order: built.primitive_indices,
-        };
+        let topology = Self::clustered(boxes, effort);
         if topology.levels() <= max_levels {
             return topology;
         }
@@ -80,6 +88,37 @@ impl Topology {
             "log₈ of 2³² things is below every limit"
         );
         balanced
+    }
+
+    /// The tree of obvhs. It merges neighbours along a curve through space that each prefer the other; where costs
+    /// tie or grow along the curve only one pair does, which takes quadratic time and ends in a chain. So boxes go in
+    /// shuffled, which is the order of boxes with one centre, and disturbed, which breaks ties.
+    fn clustered(boxes: &[Aabb], effort: Effort) -> Self {
+        let mut random = SplitMix(0);
+        let mut shuffle: Vec<_> = (0..boxes.len() as u32).collect();
+        for last in (1..shuffle.len()).rev() {
+            shuffle.swap(last, (random.next() % (last as u64 + 1)) as usize);
+        }
+        let disturbed: Vec<_> = shuffle
+            .iter()
+            .map(|&index| disturb(&boxes[index as usize], &mut random))
+            .collect();
+        let build = || build_cwbvh(&disturbed, effort.params(), &mut Duration::default());
+        // Conversion descends recursively: a chain must not end the process.
+        let built = std::thread::scope(|scope| {
+            std::thread::Builder::new()
+                .stack_size(BUILD_STACK)
+                .spawn_scoped(scope, build)
+                .map_or_else(
+                    |_| build(),
+                    |thread| thread.join().expect("obvhs accepts finite boxes"),
+                )
+        });
+        let original = |index: &u32| shuffle[*index as usize];
+        Self {
+            nodes: built.nodes,
+            order: built.primitive_indices.iter().map(original).collect(),
+        }
     }
 
     /// Splits the boxes at the median of their centres, three times a node: as shallow as a tree can be.
@@ -179,6 +218,37 @@ impl Topology {
             .iter()
             .map(|&index| boxes[index as usize])
             .fold(Aabb::empty(), |all, one| all.union(&one))
+    }
+}
+
+/// The box, enlarged by random amounts that are small against its size, and large enough to differ after rounding.
+fn disturb(exact: &Aabb, random: &mut SplitMix) -> Aabb {
+    let size = exact.diagonal().max_element();
+    let reach = exact.min.abs().max(exact.max.abs());
+    let amount = size * DISTURB_SIZE + reach * DISTURB_REACH + DISTURB_LEAST;
+    Aabb::new(
+        exact.min - amount * random.unit_vector(),
+        exact.max + amount * random.unit_vector(),
+    )
+}
+
+/// SplitMix64, for repeatable disorder.
+struct SplitMix(u64);
+
+impl SplitMix {
+    fn next(&mut self) -> u64 {
+        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let mut z = self.0;
+        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        z ^ (z >> 31)
+    }
+
+    /// In [0, 1)³, 21 bits each.
+    fn unit_vector(&mut self) -> Vec3A {
+        let bits = self.next();
+        let part = |shift: u32| (bits >> shift & 0x1f_ffff) as f32 / (1 << 21) as f32;
+        Vec3A::new(part(0), part(21), part(42))
     }
 }
 

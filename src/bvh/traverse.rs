@@ -4,7 +4,7 @@
 //!
 //! # References
 //!
-//! [Woop13] Woop, Benthin, Wald: Watertight ray/triangle intersection. Journal of
+//! \[Woop13\] Woop, Benthin, Wald: Watertight ray/triangle intersection. Journal of
 //! Computer Graphics Techniques 2(1), 2013.
 
 use glam::{DVec3, Vec3};
@@ -94,7 +94,7 @@ impl Prepared {
     }
 }
 
-/// Rows are multiples and sums of coordinates with exact factors 0 and 1, so that this equals [Woop13] without
+/// Rows are multiples and sums of coordinates with exact factors 0 and 1, so that this equals \[Woop13\] without
 /// its permutation of axes.
 fn shear(d: Vec3) -> [Vec3; 3] {
     let a = d.abs();
@@ -157,7 +157,7 @@ fn node_hits(node: &Node, ray: &Prepared, t_min: f32, t_max: f32) -> u32 {
     hits
 }
 
-/// Parameter and weights of the second and third vertex. [Woop13] without its fall-back to double precision: a
+/// Parameter and weights of the second and third vertex. \[Woop13\] without its fall-back to double precision: a
 /// product that is rounded once keeps the sign of each edge's function right or makes it zero, in both of the
 /// triangles that share the edge, and zero counts as inside.
 fn intersect(record: &Record, ray: &Prepared) -> Option<(f32, [f32; 2])> {
@@ -287,7 +287,8 @@ pub fn closest_exhaustive(bvh: &Bvh, ray: &Ray, is_opaque: IsOpaque) -> (Option<
         let linear = |v: DVec3| m[0] * v.x + m[1] * v.y + m[2] * v.z;
         let origin = linear(ray.origin.as_dvec3()) + m[3];
         let direction = linear(ray.direction.as_dvec3());
-        let records = &bvh.triangles[group.first_triangle as usize..][..group.triangle_count as usize];
+        let records =
+            &bvh.triangles[group.first_triangle as usize..][..group.triangle_count as usize];
         for record in records {
             let Some((t, bary)) = intersect_double(record, origin, direction) else {
                 continue;

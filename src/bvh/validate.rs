@@ -109,7 +109,9 @@ impl Tree<'_> {
             let outer = child_box(node, slot);
             for axis in 0..3 {
                 if outer.0[axis] > below.0[axis] || outer.1[axis] < below.1[axis] {
-                    return Err(format!("node {index}: slot {slot} does not contain {below:?}"));
+                    return Err(format!(
+                        "node {index}: slot {slot} does not contain {below:?}"
+                    ));
                 }
             }
             all = Some(union(all, below));
@@ -142,10 +144,7 @@ impl Tree<'_> {
 
 fn triangle_bounds(record: &Record) -> Bounds {
     let [a, b, c] = [0, 1, 2].map(|corner| vertex(record, corner).as_dvec3());
-    (
-        a.min(b).min(c).to_array(),
-        a.max(b).max(c).to_array(),
-    )
+    (a.min(b).min(c).to_array(), a.max(b).max(c).to_array())
 }
 
 fn union(all: Option<Bounds>, one: Bounds) -> Bounds {
