@@ -47,7 +47,9 @@ impl Grid {
             theta.push(PI);
         }
         let opposite = (-wo.y).atan2(-wo.x).rem_euclid(2.0 * PI);
-        let spread = (width * (wo.z / wo.truncate().length().max(1e-9) + 0.5)).min(2.0);
+        // The turn of a facet sideways counts with cot θo; a wide lobe at grazing angles leaves more steeply.
+        let cotangent = wo.z / wo.truncate().length().max(1e-9);
+        let spread = (width * (cotangent + 0.02 + 0.5 * width)).min(2.0);
         let phi = invert(PHI, 2.0 * PI, opposite, spread, |p| p / (2.0 * PI));
         Self { theta, phi }
     }
@@ -116,12 +118,11 @@ impl Grid {
         let mut nodes = Vec::new();
         for t in self.theta.windows(2).filter(|t| t[1] <= PI / 2.0 + 1e-9) {
             for p in self.phi.windows(2) {
-                // Two points a side: the cells are already fine where the lobe is.
-                for (gt, gp) in [(0, 0), (0, 1), (1, 0), (1, 1)] {
-                    let at = |g: usize| 0.5 + [-1.0, 1.0][g] * 0.5 / 3.0_f64.sqrt();
-                    let theta = t[0] + (t[1] - t[0]) * at(gt);
-                    let phi = p[0] + (p[1] - p[0]) * at(gp);
-                    let area = 0.25 * (t[1] - t[0]) * (p[1] - p[0]) * theta.sin();
+                for i in 0..36 {
+                    let ((gt, wt), (gp, wp)) = (GAUSS[i / 6], GAUSS[i % 6]);
+                    let theta = t[0] + (t[1] - t[0]) * gt;
+                    let phi = p[0] + (p[1] - p[0]) * gp;
+                    let area = wt * wp * (t[1] - t[0]) * (p[1] - p[0]) * theta.sin();
                     nodes.push((spherical(theta, phi), area));
                 }
             }

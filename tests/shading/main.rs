@@ -21,6 +21,7 @@ mod lookups;
 mod oracle;
 mod random;
 mod samplers;
+mod scene;
 mod statistics;
 mod values;
 

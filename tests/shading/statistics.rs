@@ -121,7 +121,11 @@ impl Family {
             "{what}: {} tests, least p {least:.2e}, level {level:.2e}",
             self.0.len()
         );
-        let failed: Vec<_> = self.0.iter().filter(|t| !(t.1 >= level)).collect();
+        let failed: Vec<_> = self
+            .0
+            .iter()
+            .filter(|t| t.1 < level || t.1.is_nan())
+            .collect();
         assert!(failed.is_empty(), "{what}, level {level:.2e}: {failed:#?}");
     }
 }
