@@ -19,6 +19,10 @@ const SHADERS: &[(&str, &[&str], &str)] = &[
     ),
     ("tests/resources.comp", &[], "test_resources"),
     ("tests/rays.comp", &[], "test_rays"),
+    ("tests/shading_samplers.comp", &[], "test_shading_samplers"),
+    ("tests/shading_values.comp", &[], "test_shading_values"),
+    ("tests/shading_random.comp", &[], "test_shading_random"),
+    ("tests/shading_scene.comp", &[], "test_shading_scene"),
 ];
 
 fn main() {

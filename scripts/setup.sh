@@ -74,7 +74,7 @@ plan() {
     local install="apt-get install --yes --no-install-recommends"
     local names
     names="$(missing_packages | tr '\n' ' ')"
-    find_cargo >/dev/null || names+="cargo "
+    find_cargo >/dev/null || ! cargo_package_is_new || names+="cargo "
     if ! mesa_is_new; then
         if [[ "$(. /etc/os-release && echo "${VERSION_CODENAME:-}")" == bookworm ]]; then
             if ! grep -rqsE '^[^#]*bookworm-backports' /etc/apt/sources.list /etc/apt/sources.list.d; then
@@ -92,16 +92,19 @@ plan() {
 install_packages() {
     local commands command
     commands="$(plan)"
-    [[ -n "$commands" ]] || return 0
-    if [[ "$(id -u)" != 0 ]]; then
-        find_cargo >/dev/null || cargo_package_is_new || no_rust
+    if [[ -n "$commands" && "$(id -u)" != 0 ]]; then
         say "some packages are missing. Run as root, then start again:"
         printf '    %s\n' "apt-get update" "${commands//$'\n'/$'\n'    }" >&2
+        find_cargo >/dev/null || cargo_package_is_new || no_rust
         exit 1
     fi
+    find_cargo >/dev/null || cargo_package_is_new || no_rust
+    [[ -n "$commands" ]] || return 0
     export DEBIAN_FRONTEND=noninteractive
     say "apt-get update"
     apt-get update >&2
+    # Only now is it known which versions the package sources have.
+    commands="$(plan)"
     find_cargo >/dev/null || cargo_package_is_new || no_rust
     while IFS= read -r command; do
         say "$command"
@@ -158,6 +161,7 @@ if [[ "${BASH_SOURCE[0]}" == "$0" ]]; then
     echo "Everything is there. For a plain \`cargo build --release\`:"
     [[ -z "${SHADERC_LIB_DIR:-}" ]] || echo "    export SHADERC_LIB_DIR='$SHADERC_LIB_DIR'"
     [[ -z "$path_hint" ]] || echo "    $path_hint"
+    [[ -n "${SHADERC_LIB_DIR:-}$path_hint" ]] || echo "    nothing to export"
 else
     # Outside the clone, so that a build never shows up in it.
     export CARGO_TARGET_DIR="${CARGO_TARGET_DIR:-$CACHE/target}"

@@ -43,12 +43,10 @@ run_tests() {
     local log passed
     log="$(mktemp)"
     cargo test --release --locked "$@" 2>&1 | tee "$log" || { rm -f "$log"; return 1; }
-    passed="$(sed -n 's/^test result: ok\. \([0-9]*\) passed.*/\1/p' "$log" | paste -sd+ | bc_sum)"
+    passed="$(awk '/^test result: ok/ { n += $4 } END { print n + 0 }' "$log")"
     rm -f "$log"
     echo "$passed tests passed"
 }
-
-bc_sum() { local terms; read -r terms; echo $((${terms:-0})); }
 
 document() { RUSTDOCFLAGS="-D warnings" cargo doc --release --no-deps --locked; }
 

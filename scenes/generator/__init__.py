@@ -1,0 +1,1 @@
+"""Parts of scenes/make.py: shapes, images and a glTF writer that checks what it writes."""
