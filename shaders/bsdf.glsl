@@ -3,7 +3,7 @@
 //
 // The specular part is that of the glTF 2.0 specification, appendix B. Its sample
 // coupling of base and coat, base · (1 − F(v·h)), gains energy at grazing angles
-// (the appendix says so) although section 3.9 requires conservation. We use
+// (the appendix says so) although it requires conservation of accurate implementations. We use
 // base · (1 − F(n·v)) (1 − F(n·l)) / (1 − F0): reciprocal, conserving, equal at
 // normal incidence. See docs/decisions.md.
 

@@ -145,8 +145,10 @@ fn lights_are_chosen_as_often_as_their_table_says() {
 
 /// One emissive triangle, its front towards the origin or away from it.
 fn triangle(is_front: bool, is_double_sided: bool) -> ([DVec3; 3], Scene) {
-    let corners = [[1.0, 2.0, -1.0], [-2.0, 2.5, 0.5], [0.5, 1.5, 2.0]];
-    let order = if is_front { [0, 1, 2] } else { [0, 2, 1] };
+    let corners: [[f32; 3]; 3] = [[1.0, 2.0, -1.0], [-2.0, 2.5, 0.5], [0.5, 1.5, 2.0]];
+    let order: [u32; 3] = if is_front { [0, 1, 2] } else { [0, 2, 1] };
+    let corner = |i: usize| corners[order[i] as usize];
+    let edge = |i: usize| std::array::from_fn(|axis| corner(i)[axis] - corner(0)[axis]);
     let scene = Scene {
         params: Params {
             light_count: 1,
@@ -172,6 +174,17 @@ fn triangle(is_front: bool, is_double_sided: bool) -> ([DVec3; 3], Scene) {
             kind: layout::LIGHT_TRIANGLE,
             keep: 1.0,
             choice: 1.0,
+            position: corner(0),
+            edge1: edge(1),
+            edge2: edge(2),
+            material: layout::LIGHT_PLAIN
+                | if is_double_sided {
+                    layout::LIGHT_DOUBLE_SIDED
+                } else {
+                    0
+                },
+            intensity: INTENSITY,
+            emission_pdf: 0.37,
             ..Light::default()
         }],
         has_area_lights: true,
