@@ -82,8 +82,10 @@ impl Usage {
             | vk::BufferUsageFlags::SHADER_DEVICE_ADDRESS.as_raw(),
     ));
     /// Holds an acceleration structure.
-    pub const ACCELERATION_STORAGE: Self =
-        Self::of(vk::BufferUsageFlags::ACCELERATION_STRUCTURE_STORAGE_KHR);
+    pub const ACCELERATION_STORAGE: Self = Self::of(vk::BufferUsageFlags::from_raw(
+        vk::BufferUsageFlags::ACCELERATION_STRUCTURE_STORAGE_KHR.as_raw()
+            | vk::BufferUsageFlags::SHADER_DEVICE_ADDRESS.as_raw(),
+    ));
     /// Working memory of a build.
     pub const SCRATCH: Self = Self::of(vk::BufferUsageFlags::from_raw(
         vk::BufferUsageFlags::STORAGE_BUFFER.as_raw()

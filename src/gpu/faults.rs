@@ -12,20 +12,20 @@ use super::failed;
 use super::pipeline::{BindSet, ComputePipeline};
 use crate::error::Result;
 
-/// Two dispatches, the second of which reads what the first one wrote, with no barrier between
-/// them.
-pub fn missing_barrier(
-    device: &Arc<Device>,
-    pipeline: &ComputePipeline,
-    writer: &BindSet,
-    reader: &BindSet,
-    push: &[u8],
-) -> Result<()> {
+/// A copy that reads what a fill wrote, with no barrier between them. (Between
+/// dispatches newer layers only look when a heuristic is switched on.)
+pub fn missing_barrier(device: &Arc<Device>, source: &Buffer, target: &Buffer) -> Result<()> {
     let commands = Commands::begin(device, "fault: missing barrier")?;
-    for set in [writer, reader] {
-        commands.bind(pipeline, set, push);
-        // SAFETY: never submitted; the fault is in the recording only.
-        unsafe { device.raw().cmd_dispatch(commands.raw(), 1, 1, 1) };
+    let region = vk::BufferCopy {
+        src_offset: 0,
+        dst_offset: 0,
+        size: source.bytes().min(target.bytes()),
+    };
+    // SAFETY: never submitted; the fault is in the recording only.
+    unsafe {
+        let raw = device.raw();
+        raw.cmd_fill_buffer(commands.raw(), source.raw(), 0, vk::WHOLE_SIZE, 0);
+        raw.cmd_copy_buffer(commands.raw(), source.raw(), target.raw(), &[region]);
     }
     Ok(())
 }
