@@ -14,9 +14,9 @@ mod brute;
 mod scenes;
 mod soup;
 mod table;
+mod watertight;
 
 use etendue::Error;
-use etendue::film::Film;
 use etendue::render::{Control, DeviceOptions, Renderer, Tuning};
 use etendue::scene::Scene;
 use etendue::settings::{BackendChoice, Settings};
