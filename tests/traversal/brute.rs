@@ -3,7 +3,7 @@
 //! order in which instances and primitives are counted.
 
 use etendue::layout::{NONE, ProbeHit, ProbeRay};
-use etendue::scene::{AlphaMode, Scene, Texels};
+use etendue::scene::{AlphaMode, Material, Scene, Texels};
 use glam::{DAffine3, DVec2, DVec3, Vec3};
 
 use crate::Levels;
@@ -58,18 +58,25 @@ pub fn origin(scene: &Scene) -> DVec3 {
     }
 }
 
+/// Width and texels of the texture that cuts out, when any material is cut out.
+fn checker(scene: &Scene) -> Option<(u32, Vec<u8>)> {
+    let is_cut = |m: &Material| matches!(m.alpha_mode, AlphaMode::Mask { .. });
+    scene.materials.iter().any(is_cut).then(|| {
+        let texture = &scene.textures[0];
+        let Texels::Rgba8 { data, .. } = &texture.texels else {
+            panic!("only eight bits are looked up here")
+        };
+        (texture.width, data.clone())
+    })
+}
+
 impl Brute {
     pub fn new(scene: &Scene, levels: Levels) -> Self {
         let mut brute = Self {
             origin: origin(scene),
             triangles: Vec::new(),
             size: 0.0,
-            checker: scene.textures.first().map(|texture| {
-                let Texels::Rgba8 { data, .. } = &texture.texels else {
-                    panic!("only eight bits are looked up here")
-                };
-                (texture.width, data.clone())
-            }),
+            checker: checker(scene),
         };
         let uses = |mesh| scene.instances.iter().filter(|i| i.mesh == mesh).count();
         // Instance 0 is everything in world space; shared meshes follow in the scene's order.

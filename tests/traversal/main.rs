@@ -11,12 +11,17 @@
 )]
 
 mod brute;
+mod furnace;
+mod gap;
+mod pictures;
 mod scenes;
 mod soup;
 mod table;
+mod two_level;
 mod watertight;
 
 use etendue::Error;
+use etendue::film::Film;
 use etendue::render::{Control, DeviceOptions, Renderer, Tuning};
 use etendue::scene::Scene;
 use etendue::settings::{BackendChoice, Settings};
@@ -73,6 +78,13 @@ fn prober(scene: &Scene, backend: BackendChoice, levels: Levels) -> Option<Rende
         ..Settings::default()
     };
     open(scene, &settings, levels)
+}
+
+/// The complete film, with the ledger clean.
+fn render(renderer: &mut Renderer) -> Film {
+    let film = renderer.render(&mut |_| Control::Continue).unwrap();
+    assert_eq!(renderer.report().ledger.non_finite, 0);
+    film
 }
 
 /// Asserts that validation had nothing to say.
