@@ -1,0 +1,93 @@
+//! Traversal held against double precision: what rays meet, that closed meshes
+//! have no gaps, that surfaces do not meet themselves, and that both backends and
+//! both depths of the hierarchy agree. Everything runs under validation.
+//!
+//! Without a device the tests print why they are skipped; with the environment
+//! variable `ETENDUE_REQUIRE_DEVICE=1` they fail instead.
+#![allow(
+    clippy::unwrap_used,
+    clippy::print_stdout,
+    reason = "tests may unwrap, and they say why they skip and what they measured"
+)]
+
+mod brute;
+mod furnace;
+mod gap;
+mod pictures;
+mod scenes;
+mod soup;
+mod table;
+mod two_level;
+mod watertight;
+
+use etendue::Error;
+use etendue::film::Film;
+use etendue::render::{Control, DeviceOptions, Renderer, Tuning};
+use etendue::scene::Scene;
+use etendue::settings::{BackendChoice, Settings};
+
+const BACKENDS: [BackendChoice; 2] = [BackendChoice::Bvh, BackendChoice::RayQuery];
+
+/// How shared meshes are traced.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Levels {
+    /// Everything is copied into world space.
+    Flat,
+    /// Every mesh that is placed more than once keeps a group of its own.
+    Two,
+}
+
+/// A renderer under validation, or the printed reason why there is none.
+fn open(scene: &Scene, settings: &Settings, levels: Levels) -> Option<Renderer> {
+    let options = DeviceOptions {
+        device: None,
+        validation: true,
+    };
+    let copy_limit = match levels {
+        Levels::Flat => usize::MAX,
+        Levels::Two => 0,
+    };
+    let tuning = Tuning {
+        copy_limit,
+        ..Tuning::default()
+    };
+    match Renderer::tuned(scene, settings, &options, tuning) {
+        Ok(renderer) => {
+            assert_eq!(renderer.report().backend, settings.backend);
+            Some(renderer)
+        }
+        Err(error @ Error::Unsupported { .. }) if !device_required() => {
+            println!("skipped: {error}");
+            None
+        }
+        Err(error) => panic!("{error}"),
+    }
+}
+
+fn device_required() -> bool {
+    std::env::var_os("ETENDUE_REQUIRE_DEVICE").is_some_and(|value| value == "1")
+}
+
+/// A renderer for probes.
+fn prober(scene: &Scene, backend: BackendChoice, levels: Levels) -> Option<Renderer> {
+    let settings = Settings {
+        width: 8,
+        height: 8,
+        samples: 0..1,
+        backend,
+        ..Settings::default()
+    };
+    open(scene, &settings, levels)
+}
+
+/// The complete film, with the ledger clean.
+fn render(renderer: &mut Renderer) -> Film {
+    let film = renderer.render(&mut |_| Control::Continue).unwrap();
+    assert_eq!(renderer.report().ledger.non_finite, 0);
+    film
+}
+
+/// Asserts that validation had nothing to say.
+fn finish(renderer: &Renderer) {
+    assert_eq!(renderer.validation_messages(), Vec::<String>::new());
+}

@@ -1,0 +1,221 @@
+//! Both backends see the same and make the same pictures of the scenes that come
+//! with the project.
+
+use std::path::{Path, PathBuf};
+
+use etendue::film::Film;
+use etendue::layout::{ProbeHit, ProbeRay};
+use etendue::scene::{Camera, Projection, Scene, gltf};
+use etendue::settings::{BackendChoice, Settings};
+use glam::DVec3;
+
+use crate::brute::{Brute, T_TOLERANCE, check, origin};
+use crate::{BACKENDS, Levels, finish, open, prober, render};
+
+const WIDTH: u32 = 64;
+const HEIGHT: u32 = 48;
+/// Pixels of the pictures that are probed: 20 480 rays.
+const PROBED: (u32, u32) = (160, 128);
+/// Rays whose ids may differ, as a share: those on edges.
+const MOST_OTHER_IDS: f64 = 1e-4;
+/// Chance that any tile of a pair of pictures is taken for different when they are not.
+const FAMILY_WISE: f64 = 1e-3;
+const TILE: u32 = 8;
+
+/// Rays through the centres of pixels from the first camera, relative to the scene's origin.
+pub fn primary_rays(scene: &Scene, (width, height): (u32, u32)) -> Vec<ProbeRay> {
+    let aspect = f64::from(width) / f64::from(height);
+    let camera: Camera = match scene.cameras.first() {
+        Some(camera) => camera.clone(),
+        None => scene.framing_camera(aspect),
+    };
+    let pose = camera.world_from_camera;
+    let eye = pose.translation - origin(scene);
+    (0..width * height)
+        .map(|pixel| {
+            let x = (f64::from(pixel % width) + 0.5) / f64::from(width) * 2.0 - 1.0;
+            let y = 1.0 - (f64::from(pixel / width) + 0.5) / f64::from(height) * 2.0;
+            let (from, to) = match camera.projection {
+                Projection::Perspective { yfov, .. } => {
+                    let half = (0.5 * f64::from(yfov)).tan();
+                    (DVec3::ZERO, DVec3::new(x * half * aspect, y * half, -1.0))
+                }
+                Projection::Orthographic { ymag, .. } => {
+                    let half = f64::from(ymag);
+                    (DVec3::new(x * half * aspect, y * half, 0.0), DVec3::NEG_Z)
+                }
+            };
+            ProbeRay {
+                origin: (eye + pose.matrix3 * from).as_vec3().to_array(),
+                t_min: 0.0,
+                direction: (pose.matrix3 * to).normalize().as_vec3().to_array(),
+                t_max: 3e38,
+            }
+        })
+        .collect()
+}
+
+/// Chance that a normal variable is further from its mean than z > 0 deviations, by the continued fraction of
+/// Mills' ratio; good to 1e-6 of itself for z > 3, where it is used.
+fn two_sided(z: f64) -> f64 {
+    let fraction = (1..=40).rev().fold(z, |f, k| z + f64::from(k) / f);
+    2.0 * (-0.5 * z * z).exp() / (2.0 * std::f64::consts::PI).sqrt() / fraction
+}
+
+/// Deviations that none of `count` normal variables exceeds but with the chance [`FAMILY_WISE`] (Šidák).
+fn bound(count: usize) -> f64 {
+    let each = 1.0 - (1.0 - FAMILY_WISE).powf(1.0 / count as f64);
+    let (mut low, mut high) = (3.0, 20.0);
+    for _ in 0..60 {
+        let middle = 0.5 * (low + high);
+        if two_sided(middle) > each {
+            low = middle;
+        } else {
+            high = middle;
+        }
+    }
+    high
+}
+
+/// Tile means of two pictures against their standard errors; returns the largest deviation. The samples are the same
+/// on both sides, so equal pictures stay far below the bound: it is missed by a bias only.
+pub fn assert_same_picture(label: &str, a: &Film, b: &Film, (width, height): (u32, u32)) -> f64 {
+    let (tiles_x, tiles_y) = (width / TILE, height / TILE);
+    let means = [a.mean(), b.mean()];
+    let errors = [a.standard_error(), b.standard_error()];
+    let brightest = means[0].iter().flatten().fold(0f32, |m, &v| m.max(v));
+    assert!(brightest > 0.0, "{label}: black");
+    let limit = bound((tiles_x * tiles_y * 3) as usize);
+    let mut worst = 0f64;
+    for (tile, channel) in (0..tiles_x * tiles_y).flat_map(|t| [(t, 0), (t, 1), (t, 2)]) {
+        let (mut difference, mut variance, mut sum) = (0.0, 0.0, 0.0);
+        for i in 0..TILE * TILE {
+            let x = tile % tiles_x * TILE + i % TILE;
+            let pixel = ((tile / tiles_x * TILE + i / TILE) * width + x) as usize;
+            let value = |side: usize| f64::from(means[side][pixel][channel]);
+            difference += value(0) - value(1);
+            sum += value(0);
+            for side in &errors {
+                variance += f64::from(side[pixel][channel]).powi(2);
+            }
+        }
+        // Tiles without noise may differ by rounding.
+        let deviation = difference.abs() / (variance.sqrt() + 1e-5 * sum).max(f64::MIN_POSITIVE);
+        assert!(
+            deviation <= limit,
+            "{label}, tile {tile}: {deviation} deviations"
+        );
+        worst = worst.max(deviation);
+    }
+    worst
+}
+
+/// One side of a comparison: what it answered, and how it numbers.
+pub struct Side<'a> {
+    pub hits: &'a [ProbeHit],
+    pub levels: Levels,
+}
+
+/// Rays whose ids differ. These, and those whose distances differ by more than [`T_TOLERANCE`] (at grazing angles
+/// rounding moves a point by more), must be right on both sides as far as single precision can tell.
+pub fn other_ids(
+    label: &str,
+    scene: &Scene,
+    rays: &[ProbeRay],
+    [a, b]: [Side; 2],
+    same: impl Fn(&ProbeHit, &ProbeHit) -> bool,
+) {
+    let (mut others, mut doubtful) = (0, Vec::new());
+    for (i, (a, b)) in a.hits.iter().zip(b.hits).enumerate() {
+        let error = f64::from((a.t - b.t).abs());
+        let is_same = same(a, b);
+        if !is_same || error > T_TOLERANCE * f64::from(a.t.abs()) {
+            doubtful.push(i);
+        }
+        others += usize::from(!is_same);
+    }
+    for side in [a, b] {
+        if doubtful.is_empty() {
+            break;
+        }
+        let brute = Brute::new(scene, side.levels);
+        for &i in &doubtful {
+            if let Err(error) = check(&side.hits[i], &brute.trace(&rays[i])) {
+                panic!("{label}: {:?}: {error}", rays[i]);
+            }
+        }
+    }
+    println!(
+        "{label}: {others} other ids, {} checked by brute force",
+        doubtful.len()
+    );
+    assert!(
+        others as f64 <= MOST_OTHER_IDS * rays.len() as f64,
+        "{label}: {others}"
+    );
+}
+
+/// The picture of 16 samples with the default seed.
+pub fn picture(scene: &Scene, backend: BackendChoice, levels: Levels) -> Option<Film> {
+    let settings = Settings {
+        width: WIDTH,
+        height: HEIGHT,
+        samples: 0..16,
+        backend,
+        ..Settings::default()
+    };
+    let mut renderer = open(scene, &settings, levels)?;
+    let film = render(&mut renderer);
+    finish(&renderer);
+    Some(film)
+}
+
+pub const SIZE: (u32, u32) = (WIDTH, HEIGHT);
+
+fn files() -> Vec<PathBuf> {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes");
+    let mut files: Vec<_> = std::fs::read_dir(folder)
+        .unwrap()
+        .map(|entry| entry.unwrap().path())
+        .filter(|path| path.extension().is_some_and(|e| e == "gltf"))
+        .collect();
+    files.sort();
+    assert!(files.len() >= 5, "{files:?}");
+    files
+}
+
+fn compare(path: &Path) -> Option<()> {
+    let name = path.file_name().unwrap().to_string_lossy().into_owned();
+    let scene = gltf::load(path).unwrap();
+    let rays = primary_rays(&scene, PROBED);
+    let mut hits = Vec::new();
+    let mut films = Vec::new();
+    for backend in BACKENDS {
+        let renderer = prober(&scene, backend, Levels::Flat)?;
+        hits.push(renderer.probe(&rays).unwrap());
+        finish(&renderer);
+        films.push(picture(&scene, backend, Levels::Flat)?);
+    }
+    let same = |a: &ProbeHit, b: &ProbeHit| {
+        (a.instance, a.primitive, a.occluded) == (b.instance, b.primitive, b.occluded)
+    };
+    let sides = [0, 1].map(|i| Side {
+        hits: &hits[i],
+        levels: Levels::Flat,
+    });
+    other_ids(&name, &scene, &rays, sides, same);
+    let met = hits[0].iter().filter(|hit| hit.occluded != 0).count();
+    assert!(met > rays.len() / 20, "{name}: only {met} rays hit");
+    let worst = assert_same_picture(&name, &films[0], &films[1], SIZE);
+    println!("{name}: {met} hits, tiles differ by {worst:.2} deviations at most");
+    Some(())
+}
+
+#[test]
+fn backends_agree_on_the_scenes() {
+    for path in files() {
+        if compare(&path).is_none() {
+            return;
+        }
+    }
+}
