@@ -6,7 +6,7 @@ use etendue::settings::Settings;
 use glam::DVec3;
 
 use crate::common::*;
-use crate::{BOTH, largest_deviation};
+use crate::{BOTH, image_mean, largest_deviation};
 
 /// A white Lambert sphere under a sky of 1, seen whole and at its rim.
 fn white_sphere() -> [(&'static str, Scene); 2] {
@@ -52,6 +52,32 @@ fn lambert_sphere_vanishes_in_the_furnace() {
                     "{view}, × {scale}, + {offset}, {backend:?}: {off}"
                 );
             }
+        }
+    }
+}
+
+/// Single scattering loses what bounces twice between facets; it never gains.
+#[test]
+fn white_metal_never_gains_and_a_mirror_loses_nothing() {
+    for roughness in [0.0, 0.1, 0.3, 0.6, 1.0] {
+        let mut scene = empty();
+        add(&mut scene, faceted(sphere(3)), metal(1.0, roughness));
+        scene.environment = constant_sky(1.0);
+        let from = DVec3::new(0.3, 0.5, 4.0);
+        scene.cameras = vec![pinhole(from, DVec3::ZERO, 30.0)];
+        let Some(r) = render(&scene, &settings(16, 256), Tuning::default()) else {
+            return;
+        };
+        let (mean, error) = image_mean(&r.film);
+        println!("roughness {roughness}: {mean:.6} ± {error:.1e}");
+        if roughness == 0.0 {
+            // F = F0 = 1 and the lobe is chosen with certainty: roundings only.
+            assert!(largest_deviation(&r.film, 1.0) <= 1e-5);
+        } else {
+            // Every weight is a masking factor, at most 1 to rounding: no noise above 1.
+            assert!(mean <= 1.0 + 1e-4, "{mean}");
+            // Heitz's masking keeps more than half even at roughness 1.
+            assert!(mean > 0.5, "{mean}");
         }
     }
 }

@@ -19,8 +19,11 @@ mod common;
 mod closed;
 mod determinism;
 mod emission;
+mod features;
 mod furnace;
+mod normals;
 mod punctual;
+mod strategies;
 
 use etendue::film::Film;
 use etendue::settings::BackendChoice;
