@@ -1,0 +1,162 @@
+//! A render is a pure function of the scene and the settings, to the bit.
+
+use etendue::film::Film;
+use etendue::render::Tuning;
+use etendue::scene::{LightKind, PunctualLight, Scene};
+use etendue::settings::{BackendChoice, Crop, Settings};
+use glam::{DVec3, Vec3};
+
+use crate::BOTH;
+use crate::common::*;
+
+const SIDE: u32 = 20;
+const SAMPLES: u64 = 32;
+
+/// A bit of everything that scatters: Lambert, metal, an area and a point light, a sky.
+fn corner() -> Scene {
+    let mut scene = empty();
+    add(&mut scene, square(Vec3::ZERO, Vec3::Y, 3.0), lambert(0.7));
+    add(
+        &mut scene,
+        square(-2.0 * Vec3::Z, Vec3::Z, 3.0),
+        metal(0.8, 0.4),
+    );
+    add(&mut scene, sphere(2), lambert(0.4));
+    add(
+        &mut scene,
+        square(3.0 * Vec3::Y, -Vec3::Y, 0.5),
+        emitter(0.2, 8.0),
+    );
+    scene.lights = vec![PunctualLight {
+        name: String::from("lamp"),
+        kind: LightKind::Point,
+        position: DVec3::new(-2.0, 2.0, 2.0),
+        direction: -Vec3::Y,
+        intensity: Vec3::new(3.0, 2.0, 1.0),
+    }];
+    scene.environment = constant_sky(0.3);
+    scene.cameras = vec![pinhole(DVec3::new(1.0, 2.0, 5.0), DVec3::Y, 40.0)];
+    scene
+}
+
+fn plain(backend: BackendChoice) -> Settings {
+    Settings {
+        backend,
+        aovs: true,
+        ..settings(SIDE, SAMPLES)
+    }
+}
+
+/// Every float of the film's nodes, as bits, with their places in the tree.
+fn bits(film: &Film) -> Vec<(u64, u32, Vec<u32>)> {
+    let bits = |v: &[f32]| v.iter().map(|x| x.to_bits()).collect();
+    film.nodes()
+        .map(|(first, level, v)| (first, level, bits(v)))
+        .collect()
+}
+
+fn film(settings: &Settings, tuning: Tuning) -> Option<Film> {
+    render(&corner(), settings, tuning).map(|r| r.film)
+}
+
+#[test]
+fn same_seed_gives_the_same_bits_however_the_work_is_cut() {
+    for backend in BOTH {
+        let Some(first) = film(&plain(backend), Tuning::default()) else {
+            continue;
+        };
+        let first = bits(&first);
+        let default = Tuning::default();
+        let cuts = [
+            default,
+            default,
+            Tuning {
+                max_pass: 1,
+                ..default
+            },
+            Tuning {
+                max_pass: 8,
+                max_tiles: 7,
+                ..default
+            },
+            Tuning {
+                max_pass: 64,
+                max_tiles: 1,
+                ..default
+            },
+            Tuning {
+                max_tiles: 64,
+                ..default
+            },
+        ];
+        for tuning in cuts {
+            let again = film(&plain(backend), tuning).unwrap();
+            assert!(
+                bits(&again) == first,
+                "{backend:?}: {tuning:?} changes the bits"
+            );
+        }
+        for seed in [2, 1 << 32 | 1] {
+            let settings = Settings {
+                seed,
+                ..plain(backend)
+            };
+            let other = film(&settings, default).unwrap();
+            assert!(
+                bits(&other) != first,
+                "{backend:?}: seed {seed:#x} changes nothing"
+            );
+        }
+    }
+}
+
+#[test]
+fn crop_is_a_part_of_the_frame() {
+    for backend in BOTH {
+        let Some(whole) = film(&plain(backend), Tuning::default()) else {
+            continue;
+        };
+        // Not on borders of tiles.
+        let crop = Crop {
+            x0: 3,
+            y0: 5,
+            x1: 17,
+            y1: 18,
+        };
+        let settings = Settings {
+            crop: Some(crop),
+            ..plain(backend)
+        };
+        let part = film(&settings, Tuning::default()).unwrap();
+        let floats = whole.floats_per_pixel();
+        let (whole, part) = (bits(&whole), bits(&part));
+        assert_eq!((whole.len(), part.len()), (1, 1));
+        let columns = (crop.x1 - crop.x0) as usize * floats;
+        for (y, row) in (crop.y0..crop.y1).zip(part[0].2.chunks_exact(columns)) {
+            let start = (y * SIDE + crop.x0) as usize * floats;
+            assert!(
+                row == &whole[0].2[start..start + columns],
+                "{backend:?}: row {y}"
+            );
+        }
+    }
+}
+
+#[test]
+fn merged_films_are_the_film_of_all_samples() {
+    for backend in BOTH {
+        let part = |samples| {
+            let settings = Settings {
+                samples,
+                ..plain(backend)
+            };
+            film(&settings, Tuning::default())
+        };
+        let Some(mut merged) = part(0..10) else {
+            continue;
+        };
+        let whole = part(0..SAMPLES).unwrap();
+        merged.merge(part(10..SAMPLES).unwrap()).unwrap();
+        assert!(bits(&merged) == bits(&whole), "{backend:?}");
+    }
+}
