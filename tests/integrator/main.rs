@@ -23,6 +23,7 @@ mod features;
 mod furnace;
 mod normals;
 mod punctual;
+mod sky;
 mod strategies;
 
 use etendue::film::Film;
@@ -40,7 +41,11 @@ fn image_mean(film: &Film) -> (f64, f64) {
     let count = film.pixels() as f64;
     let average = |v: &[f32; 3]| v.iter().map(|x| f64::from(*x)).sum::<f64>() / 3.0;
     let mean = film.mean().iter().map(average).sum::<f64>() / count;
-    let variance: f64 = film.standard_error().iter().map(|e| average(e).powi(2)).sum();
+    let variance: f64 = film
+        .standard_error()
+        .iter()
+        .map(|e| average(e).powi(2))
+        .sum();
     (mean, variance.sqrt() / count)
 }
 
