@@ -15,7 +15,8 @@
 // Roundings in a hit point, relative to the magnitudes that enter it: three in
 // the edge form, one in the vertices' own transform, doubled for safety.
 const float POSITION_ROUNDINGS = 8.0;
-// Smallest cosine between wo and the shading normal; see surface_bend.
+// Smallest cosine of wo to the shading normal, and of its mirror image to the
+// geometric one; see surface_bend.
 const float MIN_SHADING_COSINE = 1.0e-3;
 
 struct SurfacePoint {
@@ -166,12 +167,21 @@ vec3 surface_emission(Material material, uvec4 triangle, vec2 bary)
     return (material.flags & MATERIAL_UNLIT) != 0u ? emission * surface_vertex_color(triangle, bary).rgb : emission;
 }
 
-// The normal n turned towards wo until it is visible: an interpolated or mapped
-// normal may face away at grazing view, and the point would be black.
-vec3 surface_bend(vec3 n, vec3 wo)
+// The normal n turned until it is visible and mirrors wo to above the surface:
+// an interpolated or mapped normal may face away at grazing view, or point its
+// lobe below the horizon, and the point would be black. A normal that equals ng
+// is left as it is.
+vec3 surface_bend(vec3 n, vec3 ng, vec3 wo)
 {
+    float least = min(MIN_SHADING_COSINE, 0.9 * dot(ng, wo));
     float cosine = dot(n, wo);
-    return cosine >= MIN_SHADING_COSINE ? n : normalize(n + (MIN_SHADING_COSINE - cosine) * wo);
+    if (cosine < least) {
+        n = normalize(n + (least - cosine) * wo);
+        cosine = dot(n, wo);
+    }
+    vec3 mirrored = 2.0 * cosine * n - wo;
+    float height = dot(mirrored, ng);
+    return height >= least ? n : normalize(wo + normalize(mirrored + (least - height) * ng));
 }
 
 // Object-space direction of a normal carried to world space, not normalised.
@@ -259,7 +269,7 @@ SurfacePoint surface_point(Hit hit, vec3 wo)
         if (HAS_TEXTURES && (material.flags & MATERIAL_HAS_TEXTURES) != 0u) {
             n = surface_mapped_normal(material, hit.instance, triangle, shape, hit.bary, n);
         }
-        s.ns = surface_bend(s.is_front ? n : -n, wo);
+        s.ns = surface_bend(s.is_front ? n : -n, s.ng, wo);
     }
 
     vec4 base_color = surface_base_color(material, triangle, hit.bary);
