@@ -5,7 +5,7 @@ use etendue::scene::{LightKind, Mesh, PunctualLight, Scene};
 use etendue::settings::{BackendChoice, Settings, Strategy};
 use glam::{DAffine3, DMat3, DQuat, DVec3, Vec3};
 
-use crate::scenes::{cube, fan, icosphere, lambert, look_at, scaled, scene, white_sky};
+use crate::scenes::{cube, icosphere, lambert, look_at, scaled, scene, white_sky};
 use crate::{BACKENDS, Levels, finish, open, render};
 
 const ALBEDO: f32 = 0.5;
@@ -77,7 +77,7 @@ fn solid(shape: &Mesh, size: f64, place: Place) -> (Scene, DQuat, Levels) {
     (scene, turn, levels)
 }
 
-/// Pixels that are not albedo × coverage + sky, with the first of them, and the samples that hit.
+/// Asserts that every pixel is albedo × coverage + the sky beside it; returns the samples that hit.
 fn furnace(scene: &mut Scene, backend: BackendChoice, levels: Levels, label: &str) -> Option<f64> {
     white_sky(scene);
     let mut renderer = open(scene, &settings(backend, Strategy::BsdfOnly), levels)?;
@@ -148,7 +148,7 @@ fn lit_sides_are_not_in_their_own_shadow() {
             };
             let film = render(&mut renderer);
             let coverage = film.coverage().unwrap();
-            assert!(coverage.iter().any(|&c| c == 1.0));
+            assert!(coverage.contains(&1.0));
             for (mean, &hit) in film.mean().iter().zip(&coverage) {
                 let error = (mean[0] - lit * hit).abs();
                 let label = format!("cube of {size}, {place:?}, {}", backend.name());

@@ -10,7 +10,7 @@ use etendue::settings::{BackendChoice, Settings};
 use glam::DVec3;
 
 use crate::brute::{Brute, T_TOLERANCE, check, origin};
-use crate::{BACKENDS, Levels, finish, open, prober, render};
+use crate::{BACKENDS, Levels, finish, open, render};
 
 const WIDTH: u32 = 64;
 const HEIGHT: u32 = 48;
@@ -116,8 +116,9 @@ pub struct Side<'a> {
     pub levels: Levels,
 }
 
-/// Rays whose ids differ. These, and those whose distances differ by more than [`T_TOLERANCE`] (at grazing angles
-/// rounding moves a point by more), must be right on both sides as far as single precision can tell.
+/// Bounds the rays whose ids differ. These, and those whose distances differ by more than [`T_TOLERANCE`] (where
+/// rounding moves a point by more: at grazing angles, or near the eye on triangles that are large), must be right on
+/// both sides as far as single precision can tell.
 pub fn other_ids(
     label: &str,
     scene: &Scene,
@@ -155,8 +156,13 @@ pub fn other_ids(
     );
 }
 
-/// The picture of 16 samples with the default seed.
-pub fn picture(scene: &Scene, backend: BackendChoice, levels: Levels) -> Option<Film> {
+/// What the rays meet, and the picture of 16 samples with the default seed.
+pub fn look(
+    scene: &Scene,
+    rays: &[ProbeRay],
+    backend: BackendChoice,
+    levels: Levels,
+) -> Option<(Vec<ProbeHit>, Film)> {
     let settings = Settings {
         width: WIDTH,
         height: HEIGHT,
@@ -165,9 +171,10 @@ pub fn picture(scene: &Scene, backend: BackendChoice, levels: Levels) -> Option<
         ..Settings::default()
     };
     let mut renderer = open(scene, &settings, levels)?;
+    let hits = renderer.probe(rays).unwrap();
     let film = render(&mut renderer);
     finish(&renderer);
-    Some(film)
+    Some((hits, film))
 }
 
 pub const SIZE: (u32, u32) = (WIDTH, HEIGHT);
@@ -191,10 +198,9 @@ fn compare(path: &Path) -> Option<()> {
     let mut hits = Vec::new();
     let mut films = Vec::new();
     for backend in BACKENDS {
-        let renderer = prober(&scene, backend, Levels::Flat)?;
-        hits.push(renderer.probe(&rays).unwrap());
-        finish(&renderer);
-        films.push(picture(&scene, backend, Levels::Flat)?);
+        let (found, film) = look(&scene, &rays, backend, Levels::Flat)?;
+        hits.push(found);
+        films.push(film);
     }
     let same = |a: &ProbeHit, b: &ProbeHit| {
         (a.instance, a.primitive, a.occluded) == (b.instance, b.primitive, b.occluded)

@@ -31,16 +31,6 @@ impl Random {
     pub fn cube(&mut self) -> DVec3 {
         DVec3::from([(); 3].map(|()| 2.0 * self.unit() - 1.0))
     }
-
-    /// Uniform over the unit sphere.
-    pub fn direction(&mut self) -> DVec3 {
-        loop {
-            let v = self.cube();
-            if (0.01..1.0).contains(&v.length_squared()) {
-                return v.normalize();
-            }
-        }
-    }
 }
 
 /// Lambert of the given albedo.

@@ -5,9 +5,9 @@ use etendue::layout::{NONE, ProbeHit};
 use etendue::scene::{Material, Scene};
 use glam::{DAffine3, DMat3, DQuat, DVec3, Vec3};
 
-use crate::pictures::{SIZE, Side, assert_same_picture, other_ids, picture, primary_rays};
+use crate::pictures::{SIZE, Side, assert_same_picture, look, other_ids, primary_rays};
 use crate::scenes::{cube, fan, icosphere, lambert, look_at, scaled, scene};
-use crate::{BACKENDS, Levels, finish, prober};
+use crate::{BACKENDS, Levels};
 
 /// A floor, placed spheres and placed lamps; turned, stretched and mirrored. Lamps shine from the front only, so
 /// that a mirrored one that forgot to turn its winding would be dark.
@@ -97,12 +97,11 @@ fn two_levels_equal_copies() {
         let mut hits = Vec::new();
         let mut films = Vec::new();
         for levels in [Levels::Flat, Levels::Two] {
-            let Some(renderer) = prober(&scene, backend, levels) else {
+            let Some((found, film)) = look(&scene, &rays, backend, levels) else {
                 return;
             };
-            hits.push(renderer.probe(&rays).unwrap());
-            finish(&renderer);
-            films.push(picture(&scene, backend, levels).unwrap());
+            hits.push(found);
+            films.push(film);
         }
         let sides = [(0, Levels::Flat), (1, Levels::Two)].map(|(i, levels)| Side {
             hits: &hits[i],
