@@ -70,6 +70,9 @@ impl Record<'_> {
         let ledger = &self.report.ledger;
         put("ledger.non_finite", count(ledger.non_finite));
         put("ledger.truncated_paths", count(ledger.truncated_paths));
+        // per path: what they would have added if unit radiance had met each of them
+        let throughput = ledger.truncated_throughput / self.report.paths.max(1) as f64;
+        put("ledger.truncated_throughput", throughput.into());
         // a limit that looks at the samples favours images that look finished early
         put("ledger.stop", self.stop_text().into());
         self.put_settings(&mut data);
