@@ -16,6 +16,7 @@
 #[path = "../common/mod.rs"]
 mod common;
 
+mod analytic;
 mod closed;
 mod determinism;
 mod emission;

@@ -1,0 +1,127 @@
+//! Lights with an answer from outside: Lambert's polygon formula, and quadrature
+//! of a map's bilinear reconstruction.
+
+use std::f64::consts::PI;
+use std::sync::Arc;
+
+use etendue::render::Tuning;
+use etendue::scene::{Environment, Scene};
+use etendue::settings::{BackendChoice, Settings, Strategy};
+use glam::{DVec3, Vec3};
+
+use crate::common::*;
+use crate::{Z, image_mean};
+
+/// Relative error that is allowed, chance included.
+const DELTA: f64 = 5e-3;
+
+fn assert_mean(what: &str, scene: &Scene, settings: &Settings, truth: f64) {
+    let Some(r) = render(scene, settings, Tuning::default()) else {
+        return;
+    };
+    let (mean, error) = image_mean(&r.film);
+    assert!(
+        (mean - truth).abs() + Z * error <= DELTA * truth,
+        "{what}: {mean} ± {error}, not {truth}"
+    );
+}
+
+/// Irradiance of a polygon of radiance 1 on a point with normal n: half the sum
+/// of the edges' angles times the normals of their planes. [Lambert 1760]
+fn lambert_polygon(corners: &[DVec3], at: DVec3, n: DVec3) -> f64 {
+    let rays: Vec<DVec3> = corners.iter().map(|c| (*c - at).normalize()).collect();
+    let sum: f64 = (0..rays.len())
+        .map(|i| {
+            let (a, b) = (rays[i], rays[(i + 1) % rays.len()]);
+            let cross = a.cross(b);
+            cross.length().atan2(a.dot(b)) * cross.normalize().dot(n)
+        })
+        .sum();
+    (0.5 * sum).abs()
+}
+
+/// From three times the light's size down to a thousandth of it.
+#[test]
+fn polygon_light_obeys_lamberts_formula_at_every_height() {
+    let at = DVec3::new(0.21, 0.0, -0.13);
+    for height in [3.0, 0.3, 0.03, 1e-3] {
+        let mut scene = empty();
+        add(&mut scene, square(Vec3::ZERO, Vec3::Y, 4.0), lambert(1.0));
+        let light = square(Vec3::new(0.0, height, 0.0), Vec3::NEG_Y, 0.5);
+        let corners: Vec<DVec3> = light.positions.iter().map(|p| p.as_dvec3()).collect();
+        add(&mut scene, light, emitter(0.0, 5.0));
+        // From between the plane and the light, a spot small enough to be a point.
+        let eye = at + f64::from(height) * DVec3::new(0.2, 0.5, 0.1);
+        scene
+            .cameras
+            .push(parallel(eye, at, 1e-3 * f64::from(height)));
+        let truth = 5.0 * lambert_polygon(&corners, at, DVec3::Y) / PI;
+        assert_mean(&format!("{height} m"), &scene, &settings(32, 1024), truth);
+    }
+}
+
+const WIDTH: i64 = 12;
+const HEIGHT: i64 = 6;
+
+/// The only texel with light.
+fn texel(x: i64, y: i64) -> f64 {
+    if (x.rem_euclid(WIDTH), y) == (5, 1) {
+        30.0
+    } else {
+        0.0
+    }
+}
+
+/// Irradiance over π of a plane y = 0, by the midpoint rule with 64² points a texel.
+fn quadrature() -> f64 {
+    const POINTS: i64 = 64;
+    let (columns, rows) = (WIDTH * POINTS, HEIGHT * POINTS);
+    let cell = 2.0 * PI / columns as f64 * PI / rows as f64;
+    let mut sum = 0.0;
+    for row in 0..rows / 2 {
+        let theta = PI * (row as f64 + 0.5) / rows as f64;
+        let y = (row as f64 + 0.5) / POINTS as f64 - 0.5;
+        for column in 0..columns {
+            let x = (column as f64 + 0.5) / POINTS as f64 - 0.5;
+            let (fx, fy) = (x - x.floor(), y - y.floor());
+            let at = |dx, dy: i64| texel(x.floor() as i64 + dx, y.floor() as i64 + dy);
+            let value = (at(0, 0) * (1.0 - fx) + at(1, 0) * fx) * (1.0 - fy)
+                + (at(0, 1) * (1.0 - fx) + at(1, 1) * fx) * fy;
+            sum += value * theta.sin() * theta.cos() * cell;
+        }
+    }
+    sum / PI
+}
+
+/// A table from the texels alone has density zero beside the bright one, where
+/// the bilinear reconstruction has light.
+#[test]
+fn single_bright_texel_lights_a_plane_by_its_reconstruction() {
+    let texels = (0..WIDTH * HEIGHT).map(|i| [texel(i % WIDTH, i / WIDTH) as f32; 3]);
+    let mut scene = empty();
+    scene.environment = Some(Environment::Map {
+        width: WIDTH as u32,
+        height: HEIGHT as u32,
+        texels: Arc::new(texels.collect()),
+        intensity: 1.0,
+        rotation: 0.0,
+    });
+    add(&mut scene, square(Vec3::ZERO, Vec3::Y, 1.0), lambert(1.0));
+    scene
+        .cameras
+        .push(pinhole(DVec3::new(0.1, 1.0, 0.2), DVec3::ZERO, 30.0));
+    let truth = quadrature();
+    // Light that is found by chance needs more samples.
+    for (strategy, samples) in [
+        (Strategy::BsdfOnly, 16_384),
+        (Strategy::LightOnly, 2048),
+        (Strategy::Mis, 2048),
+    ] {
+        let settings = Settings {
+            strategy,
+            backend: BackendChoice::Bvh,
+            ..settings(32, samples)
+        };
+        assert_mean(&format!("{strategy:?}"), &scene, &settings, truth);
+    }
+}
