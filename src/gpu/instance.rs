@@ -2,7 +2,7 @@
 //! validation layer speaks.
 
 use std::borrow::Cow;
-use std::ffi::{CStr, c_void};
+use std::ffi::{CStr, c_char, c_void};
 use std::sync::{Arc, Mutex, PoisonError};
 
 use ash::vk;
@@ -228,11 +228,10 @@ unsafe extern "system" fn on_message(
 ) -> vk::Bool32 {
     // SAFETY: the layer passes valid, terminated strings (or null) for the time of the call.
     let text = unsafe {
-        data.as_ref()
-            .filter(|d| !d.p_message.is_null())
-            .map_or(Cow::Borrowed("(no text)"), |d| {
-                CStr::from_ptr(d.p_message).to_string_lossy()
-            })
+        data.as_ref().map_or_else(
+            || String::from("(no text)"),
+            |d| with_rule(&lossy(d.p_message_id_name), &lossy(d.p_message)),
+        )
     };
     if severity.contains(vk::DebugUtilsMessageSeverityFlagsEXT::ERROR) {
         tracing::error!(target: "vulkan", "{text}");
@@ -241,8 +240,31 @@ unsafe extern "system" fn on_message(
     }
     // SAFETY: `user_data` is the log that `Instance` owns for longer than the messenger lives.
     if let Some(log) = unsafe { user_data.cast::<ValidationLog>().as_ref() } {
-        log.push(text.into_owned());
+        log.push(text);
     }
     // The call that is judged goes on.
     vk::FALSE
+}
+
+/// The text of a string of the layer; empty when there is none.
+///
+/// # Safety
+///
+/// `string` is null, or terminated and unchanged while the result lives.
+unsafe fn lossy<'a>(string: *const c_char) -> Cow<'a, str> {
+    if string.is_null() {
+        return Cow::Borrowed("");
+    }
+    // SAFETY: the caller's promise.
+    unsafe { CStr::from_ptr(string) }.to_string_lossy()
+}
+
+/// A message with the name of the rule that was broken. Older layers (1.3.239) repeat it
+/// in every text; newer ones (1.4.309) leave it out of some.
+fn with_rule(rule: &str, text: &str) -> String {
+    if text.contains(rule) {
+        text.to_owned()
+    } else {
+        format!("{rule}: {text}")
+    }
 }
