@@ -2,7 +2,7 @@
 // of the samples into ranges gives the same bits. The host continues the tree
 // above the batch (src/film.rs) with the same operations in the same order.
 //
-// [Chan79] Chan, Golub, LeVeque, Updating Formulae for Computing Sample Variances.
+// [Chan83] Chan, Golub, LeVeque, Algorithms for Computing the Sample Variance.
 
 #ifndef FILM_GLSL
 #define FILM_GLSL

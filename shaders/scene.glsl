@@ -1,5 +1,5 @@
 // The scene's buffers. Read-only arrays that are walked per ray are texel
-// buffers: 20–30 % faster than storage buffers on lavapipe (docs/decisions.md).
+// buffers, which lavapipe reads faster than storage buffers (docs/decisions.md).
 
 #ifndef SCENE_GLSL
 #define SCENE_GLSL
