@@ -2,7 +2,7 @@
 
 use glam::{Vec3, Vec4};
 
-use super::TextureRef;
+use super::{TextureRef, Volume};
 
 /// How the alpha of the base colour is read.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -52,6 +52,12 @@ pub struct Material {
     pub specular_color: Vec3,
     /// Factor on `specular_color`, RGB.
     pub specular_color_texture: Option<TextureRef>,
+    /// KHR_materials_transmission: fraction of the light through the coat that goes on instead of being scattered by the base.
+    pub transmission: f32,
+    /// Factor on `transmission`, in R.
+    pub transmission_texture: Option<TextureRef>,
+    /// What the closed mesh encloses; none with transmission is an infinitely thin sheet.
+    pub volume: Option<Volume>,
     /// How alpha is read.
     pub alpha_mode: AlphaMode,
     /// Emits from both sides. (Reflection never depends on it: nothing is culled.)
@@ -79,6 +85,9 @@ impl Default for Material {
             specular_texture: None,
             specular_color: Vec3::ONE,
             specular_color_texture: None,
+            transmission: 0.0,
+            transmission_texture: None,
+            volume: None,
             alpha_mode: AlphaMode::Opaque,
             double_sided: false,
             unlit: false,
@@ -96,6 +105,7 @@ impl Material {
             self.emission_texture,
             self.specular_texture,
             self.specular_color_texture,
+            self.transmission_texture,
         ]
         .into_iter()
         .flatten()

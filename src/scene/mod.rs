@@ -10,6 +10,7 @@ pub(crate) mod environment;
 pub mod gltf;
 mod light;
 mod material;
+mod medium;
 mod mesh;
 mod texture;
 
@@ -19,6 +20,7 @@ pub use camera::{Camera, Projection};
 pub use environment::{Environment, LoadedEnvironment, load_environment};
 pub use light::{LightKind, PunctualLight};
 pub use material::{AlphaMode, Material};
+pub use medium::{Medium, Phase, Volume, absorption_of};
 pub use mesh::Mesh;
 pub use texture::{Filter, Texels, Texture, TextureRef, Wrap};
 
@@ -50,6 +52,8 @@ pub struct Scene {
     pub cameras: Vec<Camera>,
     /// Radiance that arrives from infinity; none is black.
     pub environment: Option<Environment>,
+    /// What fills all space outside the closed meshes; none is vacuum. Its index of refraction is 1.
+    pub medium: Option<Medium>,
     /// What the loader had to leave out or change, for the user to read.
     pub warnings: Vec<String>,
     /// SHA-256 of the scene file and everything that it refers to, hexadecimal.

@@ -121,6 +121,7 @@ fn load_checked(path: &Path, limits: &Limits) -> Check<Scene> {
         lights: light::load(&root, &nodes, &mut warnings)?,
         cameras: view::load(&root, &nodes)?,
         environment,
+        medium: None,
         warnings: warnings.finish(),
         hash: files.hash(),
     })
