@@ -16,6 +16,8 @@ mod builder;
 mod geometry;
 #[path = "loader/hostile.rs"]
 mod hostile;
+#[path = "loader/media.rs"]
+mod media;
 #[path = "loader/shading.rs"]
 mod shading;
 #[path = "loader/world.rs"]

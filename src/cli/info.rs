@@ -4,7 +4,7 @@ use std::fmt::Write;
 use std::path::Path;
 
 use etendue::render::{self, DeviceInfo, SceneModel};
-use etendue::scene::{LightKind, Scene, gltf};
+use etendue::scene::{Instance, LightKind, Material, Scene, gltf};
 use etendue::settings::Settings;
 use serde_json::{Map, Value as Json, json};
 
@@ -66,7 +66,11 @@ fn load(path: &Path) -> Result<(Scene, SceneModel), Failure> {
 }
 
 /// What a scene holds, by name.
-fn counts(scene: &Scene) -> [(&'static str, u64); 10] {
+fn counts(scene: &Scene) -> [(&'static str, u64); 13] {
+    let of = |i: &Instance| &scene.materials[scene.meshes[i.mesh as usize].material as usize];
+    let placed = |is: fn(&Material) -> bool| scene.instances.iter().filter(|i| is(of(i))).count();
+    let inside = scene.materials.iter().filter_map(|m| m.volume);
+    let media = inside.map(|v| v.medium).chain(scene.medium);
     let lights = |is: fn(&LightKind) -> bool| scene.lights.iter().filter(|l| is(&l.kind)).count();
     [
         ("meshes", scene.meshes.len()),
@@ -74,6 +78,12 @@ fn counts(scene: &Scene) -> [(&'static str, u64); 10] {
         ("triangles", scene.triangle_count() as usize),
         ("materials", scene.materials.len()),
         ("textures", scene.textures.len()),
+        ("solids", placed(|m| m.volume.is_some())),
+        (
+            "thin_sheets",
+            placed(|m| m.volume.is_none() && m.transmission > 0.0),
+        ),
+        ("media", media.filter(|m| !m.is_clear()).count()),
         ("lights", scene.lights.len()),
         ("point_lights", lights(|k| matches!(k, LightKind::Point))),
         (
@@ -213,7 +223,52 @@ fn bytes(bytes: u64) -> String {
 
 #[cfg(test)]
 mod tests {
+    use etendue::scene::{Medium, Mesh, Volume};
+
     use super::*;
+
+    #[test]
+    fn solids_and_sheets_count_as_often_as_they_are_placed_and_clear_media_not() {
+        let transmitting = |volume| Material {
+            transmission: 1.0,
+            volume,
+            ..Material::default()
+        };
+        let fog = Medium {
+            scattering: glam::Vec3::ONE,
+            ..Medium::default()
+        };
+        let volume = |medium| {
+            Some(Volume {
+                medium,
+                priority: 0,
+            })
+        };
+        let mesh = |material| Mesh {
+            material,
+            ..Mesh::default()
+        };
+        let placed = |mesh| Instance {
+            name: String::new(),
+            mesh,
+            world_from_object: glam::DAffine3::IDENTITY,
+        };
+        let scene = Scene {
+            materials: vec![
+                Material::default(),
+                transmitting(None),
+                transmitting(volume(Medium::default())),
+                transmitting(volume(fog)),
+            ],
+            meshes: (0..4).map(mesh).collect(),
+            instances: [0, 1, 1, 1, 2, 3].map(placed).into(),
+            medium: Some(fog),
+            ..Scene::default()
+        };
+        for wanted in [("thin_sheets", 3), ("solids", 2), ("media", 2)] {
+            assert!(counts(&scene).contains(&wanted), "{wanted:?}");
+        }
+    }
 
     #[test]
     fn bytes_have_fitting_units() {

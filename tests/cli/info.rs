@@ -34,6 +34,9 @@ fn info_describes_devices_and_scenes() {
         ("triangles", 2),
         ("materials", 1),
         ("textures", 0),
+        ("solids", 0),
+        ("thin_sheets", 0),
+        ("media", 0),
         ("lights", 0),
         ("cameras", 2),
     ];

@@ -15,7 +15,10 @@ pub fn whole() -> Asset {
         "extensions": {
             "KHR_materials_emissive_strength": { "emissiveStrength": 5 },
             "KHR_materials_ior": { "ior": 1.5 },
-            "KHR_materials_specular": { "specularColorFactor": [1, 1, 1] }
+            "KHR_materials_specular": { "specularColorFactor": [1, 1, 1] },
+            "KHR_materials_transmission": { "transmissionFactor": 1 },
+            "KHR_materials_volume": { "thicknessFactor": 1, "attenuationDistance": 2 },
+            "ETENDUE_medium": { "phase": "henyey-greenstein", "g": 0.5 }
         }
     }));
     let indices = asset.accessor(U16, "SCALAR", 3, &[0, 0, 1, 0, 2, 0]);
@@ -41,6 +44,10 @@ pub fn whole() -> Asset {
     asset.push("/nodes", json!({ "camera": 0, "children": [2] }));
     asset.push("/nodes", json!({ "camera": 1, "rotation": [0, 0, 0, 1] }));
     asset.set("/scenes/0/nodes", json!([0, 1]));
+    asset.set(
+        "/scenes/0/extensions",
+        json!({ "ETENDUE_medium": { "scattering": [1, 1, 1] } }),
+    );
     asset
 }
 

@@ -15,12 +15,15 @@ use crate::scene::environment::decode_map;
 /// Extensions that are read.
 const SUPPORTED: &[&str] = &[
     "ETENDUE_environment",
+    "ETENDUE_medium",
     "EXT_mesh_gpu_instancing",
     "KHR_lights_punctual",
     "KHR_materials_emissive_strength",
     "KHR_materials_ior",
     "KHR_materials_specular",
+    "KHR_materials_transmission",
     "KHR_materials_unlit",
+    "KHR_materials_volume",
     QUANTIZATION,
     "KHR_texture_transform",
 ];

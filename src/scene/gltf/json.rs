@@ -4,7 +4,7 @@
 //!
 //! The `gltf` crate's types are not used: its validation cannot be made to name
 //! the offending property of every extension read here, and it knows neither
-//! instancing nor `ETENDUE_environment`.
+//! instancing nor our own extensions.
 
 mod list;
 
@@ -190,12 +190,23 @@ schema! {
     SceneExtensions {
         #[serde(rename = "ETENDUE_environment")]
         environment: Option<Environment>,
+        #[serde(rename = "ETENDUE_medium")]
+        medium: Option<Box<Medium>>,
     }
     Environment {
         radiance: Option<[f64; 3]>,
         uri: Option<String>,
         intensity: Option<f64>,
         rotation: Option<f64>,
+    }
+    /// Of a material or a scene.
+    Medium {
+        absorption: Option<[f64; 3]>,
+        scattering: Option<[f64; 3]>,
+        phase: Option<String>,
+        g: Option<f64>,
+        rayleigh550: Option<f64>,
+        priority: Option<i32>,
     }
     Material {
         name: Option<String>,
@@ -239,6 +250,12 @@ schema! {
         ior: Option<Ior>,
         #[serde(rename = "KHR_materials_specular")]
         specular: Option<Specular>,
+        #[serde(rename = "KHR_materials_transmission")]
+        transmission: Option<Box<Transmission>>,
+        #[serde(rename = "KHR_materials_volume")]
+        volume: Option<Box<Volume>>,
+        #[serde(rename = "ETENDUE_medium")]
+        medium: Option<Box<Medium>>,
         #[serde(rename = "KHR_materials_unlit")]
         unlit: Option<Ignored>,
     }
@@ -253,6 +270,15 @@ schema! {
         specular_texture: Option<TextureInfo>,
         specular_color_factor: Option<[f64; 3]>,
         specular_color_texture: Option<TextureInfo>,
+    }
+    Transmission {
+        transmission_factor: Option<f64>,
+        transmission_texture: Option<TextureInfo>,
+    }
+    Volume {
+        thickness_factor: Option<f64>,
+        attenuation_color: Option<[f64; 3]>,
+        attenuation_distance: Option<f64>,
     }
 }
 

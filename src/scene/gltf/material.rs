@@ -5,8 +5,8 @@ use glam::{DVec3, Vec3, Vec4};
 use super::json::{self, Root, TextureInfo};
 use super::resolve::Files;
 use super::texture::{ColorSpace, Textures, material_label};
-use super::{Check, Warnings, quote};
-use crate::scene::{AlphaMode, Material, TextureRef};
+use super::{Check, Warnings, medium, quote};
+use crate::scene::{AlphaMode, Material, TextureRef, Volume, absorption_of};
 
 /// Loads every material of the file, in its order.
 pub(super) fn load(
@@ -37,6 +37,7 @@ pub(super) fn load(
         loader.surface(from, &mut material)?;
         loader.emission(from, &mut material)?;
         loader.dielectric(&from.extensions, &mut material)?;
+        loader.transmission(&from.extensions, &mut material)?;
         materials.push(material);
     }
     Ok(materials)
@@ -183,6 +184,88 @@ impl Loader<'_, '_> {
             ColorSpace::Srgb,
             "specularColorTexture",
         )?;
+        Ok(())
+    }
+
+    fn transmission(
+        &mut self,
+        from: &json::MaterialExtensions,
+        material: &mut Material,
+    ) -> Check<()> {
+        if let Some(transmission) = &from.transmission {
+            material.transmission =
+                self.fraction(transmission.transmission_factor, 0.0, "transmissionFactor");
+            material.transmission_texture = self.texture(
+                transmission.transmission_texture.as_ref(),
+                ColorSpace::Linear,
+                "transmissionTexture",
+            )?;
+        }
+        let mut volume = self.volume(from.volume.as_deref())?;
+        if volume.is_some() && material.transmission == 0.0 {
+            self.warnings.push(format!(
+                "{}: KHR_materials_volume is ignored: no light enters without KHR_materials_transmission",
+                self.user
+            ));
+            volume = None;
+        }
+        if volume.is_some() && material.ior == 0.0 {
+            return Err(format!(
+                "{}: KHR_materials_volume needs a finite index, which ior 0 is not",
+                self.user
+            ));
+        }
+        self.medium(from.medium.as_deref(), &mut volume)?;
+        material.volume = volume;
+        Ok(())
+    }
+
+    /// KHR_materials_volume: a solid where it has a thickness, whose value does not matter.
+    fn volume(&mut self, from: Option<&json::Volume>) -> Check<Option<Volume>> {
+        let Some(from) = from else {
+            return Ok(None);
+        };
+        let thickness = from.thickness_factor.unwrap_or(0.0);
+        if thickness < 0.0 {
+            return Err(format!(
+                "{}: thicknessFactor {thickness} is negative",
+                self.user
+            ));
+        }
+        // Absent is infinite, which JSON cannot say.
+        let distance = from
+            .attenuation_distance
+            .map_or(f32::INFINITY, |d| d as f32);
+        if distance <= 0.0 {
+            return Err(format!(
+                "{}: attenuationDistance must be positive",
+                self.user
+            ));
+        }
+        let color = from.attenuation_color.unwrap_or([1.0; 3]);
+        let color = color.map(|c| self.fraction(Some(c), 1.0, "attenuationColor"));
+        let mut volume = Volume::default();
+        volume.medium.absorption = absorption_of(color.into(), distance);
+        Ok((thickness > 0.0).then_some(volume))
+    }
+
+    /// ETENDUE_medium, which adds to what KHR_materials_volume absorbs.
+    fn medium(&mut self, from: Option<&json::Medium>, volume: &mut Option<Volume>) -> Check<()> {
+        let Some(from) = from else {
+            return Ok(());
+        };
+        let user = format!("{}: ETENDUE_medium", self.user);
+        let medium = medium::read(from, &user)?;
+        let Some(volume) = volume else {
+            self.warnings.push(format!(
+                "{user} is ignored: the material encloses nothing, which takes KHR_materials_transmission and a thickness of KHR_materials_volume above 0"
+            ));
+            return Ok(());
+        };
+        let attenuation = volume.medium.absorption;
+        volume.medium = medium;
+        volume.medium.absorption = medium::sum(attenuation, medium.absorption);
+        volume.priority = from.priority.unwrap_or(0);
         Ok(())
     }
 

@@ -6,11 +6,12 @@
 //! What is read: `.gltf`, `.glb`, data URIs and external files; meshes (sparse
 //! accessors, KHR_mesh_quantization, EXT_mesh_gpu_instancing), cameras,
 //! metallic-roughness materials (KHR_texture_transform,
-//! KHR_materials_emissive_strength, _ior, _specular, _unlit),
-//! KHR_lights_punctual and ETENDUE_environment. Skins, morph targets and
-//! animations are left out with a warning; occlusion textures need none, since
-//! occlusion is computed. A light's `range` is ignored: it would break the
-//! inverse square law.
+//! KHR_materials_emissive_strength, _ior, _specular, _transmission, _unlit,
+//! _volume), KHR_lights_punctual, ETENDUE_environment and ETENDUE_medium. Skins,
+//! morph targets and animations are left out with a warning; occlusion textures
+//! need none, since occlusion is computed, nor do thickness textures, since rays
+//! go as far as the mesh is thick. A light's `range` is ignored: it would break
+//! the inverse square law.
 
 mod accessor;
 mod container;
@@ -19,6 +20,7 @@ mod image;
 mod json;
 mod light;
 mod material;
+mod medium;
 mod mesh;
 mod node;
 mod place;
@@ -113,6 +115,7 @@ fn load_checked(path: &Path, limits: &Limits) -> Check<Scene> {
         ));
     }
     let environment = extension::environment(&root, &mut files, &mut textures, &mut warnings)?;
+    let medium = medium::of_scene(&root, &mut warnings)?;
     Ok(Scene {
         meshes: std::mem::take(&mut meshes.list),
         instances,
@@ -121,7 +124,7 @@ fn load_checked(path: &Path, limits: &Limits) -> Check<Scene> {
         lights: light::load(&root, &nodes, &mut warnings)?,
         cameras: view::load(&root, &nodes)?,
         environment,
-        medium: None,
+        medium,
         warnings: warnings.finish(),
         hash: files.hash(),
     })
