@@ -3,6 +3,7 @@
 import base64
 import json
 import struct
+from collections import Counter
 
 from .vector import cross, dot, length, look_along, sub
 
@@ -27,6 +28,7 @@ class Gltf:
         self.roots = []
         self.scene_extensions = {}
         self.lights = []
+        self.closed = set()
         self.extensions = set()
 
     def _add(self, kind, part):
@@ -77,18 +79,23 @@ class Gltf:
             "count": len(indices),
             "type": "SCALAR",
         }
-        return {
+        geometry = {
             "attributes": {k: v for k, v in attributes.items() if v is not None},
             "indices": self._add("accessors", accessor),
         }
+        if is_closed(shape):
+            self.closed.add(geometry["indices"])
+        return geometry
 
     def mesh(self, name, *primitives):
         """Each primitive is (shape or geometry, material)."""
         built = []
         for geometry, material in primitives:
+            text = compact(self.parts["materials"][material])
             if not isinstance(geometry, dict):
-                textured = "Texture" in compact(self.parts["materials"][material])
-                geometry = self.geometry(geometry, textured)
+                geometry = self.geometry(geometry, textured="Texture" in text)
+            if "KHR_materials_volume" in text:
+                assert geometry["indices"] in self.closed, "a solid is not closed"
             built.append({**geometry, "material": material})
         return self._add("meshes", {"name": name, "primitives": built})
 
@@ -130,6 +137,26 @@ class Gltf:
         return self.material(
             name, color, emissiveFactor=tidy(radiance, 7), extensions=extensions, **rest
         )
+
+    def solid(self, name, ior, roughness=0, attenuation=None, medium=None, color=(1, 1, 1)):
+        """The boundary of a closed mesh. `attenuation`: a colour and the distance, metres, after which
+        white light has it; `medium`: ETENDUE_medium."""
+        volume = {"thicknessFactor": 1}
+        if attenuation:
+            volume |= {"attenuationColor": list(attenuation[0]), "attenuationDistance": attenuation[1]}
+        extensions = {
+            "KHR_materials_ior": {"ior": ior},
+            "KHR_materials_transmission": {"transmissionFactor": 1},
+            "KHR_materials_volume": volume,
+        }
+        if medium:
+            extensions["ETENDUE_medium"] = medium
+        return self.material(name, color, 0, roughness, extensions=extensions)
+
+    def sheet(self, name, roughness=0, color=(1, 1, 1)):
+        """An infinitely thin sheet of glass."""
+        extensions = {"KHR_materials_transmission": {"transmissionFactor": 1}}
+        return self.material(name, color, 0, roughness, extensions=extensions)
 
     def node(self, name=None, parent=None, **properties):
         """A node of the scene, or a child of the node `parent`."""
@@ -177,6 +204,11 @@ class Gltf:
         self.extensions.add("ETENDUE_environment")
         self.scene_extensions["ETENDUE_environment"] = environment
 
+    def medium(self, **medium):
+        """The scene's ETENDUE_medium."""
+        self.extensions.add("ETENDUE_medium")
+        self.scene_extensions["ETENDUE_medium"] = medium
+
     def text(self):
         """The file: one part a line, so that differences can be read."""
         scene = {"nodes": self.roots}
@@ -220,3 +252,19 @@ def check(shape):
         assert length(normal) > 0, "a triangle has no area"
         for i in triangle:
             assert not shape.normals or dot(normal, shape.normals[i]) > 0, "a normal points inward"
+
+
+def is_closed(shape):
+    """Whether each edge is run through once in each direction, and the outside is outside.
+
+    Vertices count as one where their stored positions are the same."""
+    stored = [struct.pack("<3f", *(c + 0.0 for c in p)) for p in shape.positions]
+    edges = Counter()
+    volume = 0
+    for triangle in shape.triangles:
+        a, b, c = (shape.positions[i] for i in triangle)
+        volume += dot(a, cross(b, c))
+        for i, j in zip(triangle, triangle[1:] + triangle[:1]):
+            edges[stored[i], stored[j]] += 1
+    paired = all(count == 1 and edges[j, i] == 1 for (i, j), count in list(edges.items()))
+    return paired and volume > 0

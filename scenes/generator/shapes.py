@@ -75,6 +75,78 @@ def cuboid(low, high):
     return block([(x0, y1, z0), (x0, y1, z1), (x1, y1, z1), (x1, y1, z0)], y0)
 
 
+def solid_cuboid(low, high):
+    """An axis-aligned box, closed."""
+    (x0, y0, z0), (x1, _, z1) = low, high
+    bottom = [(x0, y0, z0), (x1, y0, z0), (x1, y0, z1), (x0, y0, z1)]
+    return cuboid(low, high).joined(quad(bottom, (0, -1, 0)))
+
+
+def lathe(profile, columns, crease=40):
+    """A closed body of revolution about +Y. `profile` holds (radius, y) and runs from the axis below to
+    the axis above, with the body on its left; where it turns by less than `crease` degrees, normals are smooth."""
+    facing = []
+    for (r0, y0), (r1, y1) in zip(profile, profile[1:]):
+        size = math.hypot(r1 - r0, y1 - y0)
+        facing.append(((y1 - y0) / size, (r0 - r1) / size))
+    smooth = math.cos(math.radians(crease))
+    shape, rings = Shape([], []), {}
+
+    def ring(point, segment, neighbour):
+        normal = facing[segment]
+        if 0 <= neighbour < len(facing) and dot(normal, facing[neighbour]) > smooth:
+            # In this order, so that both segments find the same ring.
+            first, second = sorted((segment, neighbour))
+            normal = normalize(add(facing[first], facing[second]))
+        if (point, normal) not in rings:
+            rings[point, normal] = len(shape.positions)
+            radius, y = profile[point]
+            for column in range(columns):
+                phi = 2 * math.pi * column / columns
+                s, c = math.sin(phi), math.cos(phi)
+                shape.positions.append((radius * s, y, radius * c))
+                shape.normals.append((normal[0] * s, normal[1], normal[0] * c))
+        return rings[point, normal]
+
+    for i in range(len(facing)):
+        low, high = ring(i, i, i - 1), ring(i + 1, i, i + 1)
+        for column in range(columns):
+            after = (column + 1) % columns
+            # On the axis one of the two triangles has no area.
+            if profile[i][0] > 0:
+                shape.triangles.append((low + column, low + after, high + after))
+            if profile[i + 1][0] > 0:
+                shape.triangles.append((low + column, high + after, high + column))
+    return shape
+
+
+def basin(half, bottom_y, cells, height, slope):
+    """A closed block over the square ±half; its top is the graph of height(x, z), whose derivatives are slope(x, z)."""
+    shape = Shape([], [])
+    at = lambda i: half * (2 * i / cells - 1)
+    for j in range(cells + 1):
+        for i in range(cells + 1):
+            x, z = at(i), at(j)
+            dx, dz = slope(x, z)
+            shape.positions.append((x, height(x, z), z))
+            shape.normals.append(normalize((-dx, 1, -dz)))
+    for j in range(cells):
+        for i in range(cells):
+            a = j * (cells + 1) + i
+            c = a + cells + 2
+            shape.triangles += [(a, c - 1, c), (a, c, a + 1)]
+    # Around the rim, counter-clockwise seen from above.
+    side, back = range(cells), range(cells, 0, -1)
+    rim = [(0, j) for j in side] + [(i, cells) for i in side] + [(cells, j) for j in back] + [(i, 0) for i in back]
+    rim = [shape.positions[j * (cells + 1) + i] for i, j in rim]
+    for a, b in zip(rim, rim[1:] + rim[:1]):
+        under_a, under_b = (a[0], bottom_y, a[2]), (b[0], bottom_y, b[2])
+        wall = quad([a, under_a, under_b, b], (a[0] + b[0], 0, a[2] + b[2]))
+        floor = Shape([under_b, under_a, (0, bottom_y, 0)], [(0, 1, 2)], [(0, -1, 0)] * 3)
+        shape = shape.joined(Shape(wall.positions, wall.triangles, wall.normals)).joined(floor)
+    return shape
+
+
 def icosphere(subdivisions):
     """Unit sphere of 20·4ⁿ nearly equal triangles, without texture coordinates."""
     g = (1 + math.sqrt(5)) / 2
