@@ -1,5 +1,6 @@
 // glTF's metallic-roughness surface: a Lambert base under a GGX dielectric coat,
-// blended with a GGX metal. Local frame: z is the shading normal.
+// blended with a GGX metal and, where it transmits, with a dielectric interface.
+// Local frame: z is the shading normal.
 //
 // The specular part is that of the glTF 2.0 specification, appendix B. Its sample
 // coupling of base and coat, base · (1 − F(v·h)), gains energy at grazing angles
@@ -10,7 +11,7 @@
 #ifndef BSDF_GLSL
 #define BSDF_GLSL
 
-#include "microfacet.glsl"
+#include "dielectric.glsl"
 #include "sampling.glsl"
 #include "surface.glsl"
 
@@ -22,6 +23,9 @@ struct Bsdf {
     vec3 f90;
     float alpha;     // 0: mirror
     float p_specular; // probability of sampling the specular lobe
+    float glass;     // share of the interface; the rest is as above
+    float p_glass;   // probability of sampling the interface
+    Dielectric dielectric;
 };
 
 struct BsdfSample {
@@ -29,12 +33,26 @@ struct BsdfSample {
     vec3 weight;     // f cosθ / pdf; of a mirror, its reflectance / probability
     float pdf;       // per steradian; 0: a mirror
     bool is_valid;
+    bool is_transmitted;
+    bool is_straight; // passed on as if nothing was there but a filter
 };
 
 struct BsdfValue {
     vec3 f_cos;      // f · cosθi, 1/sr
     float pdf;       // per steradian, all lobes
 };
+
+// Normal about which a smooth interface refracts: the shading normal unless that would
+// send the refracted light to the wrong side of the surface.
+vec3 bsdf_interface_normal(SurfacePoint s, vec3 wo, float eta)
+{
+    if (!s.is_solid || square(s.roughness) >= GGX_MIN_ALPHA) {
+        return s.ns;
+    }
+    Fresnel f = fresnel_dielectric(dot(s.ns, wo), eta);
+    bool is_wrong = f.t > 0.0 && dot(dielectric_refract(eta, wo, s.ns, f.g), s.ng) >= 0.0;
+    return is_wrong ? s.ng : s.ns;
+}
 
 // What the coat lets through to the base and back, one direction.
 float bsdf_coat_transmission(Bsdf b, float cosine)
@@ -51,7 +69,8 @@ vec3 bsdf_diffuse(Bsdf b, float cos_o, float cos_i)
     return b.diffuse * (INV_PI * bsdf_coat_transmission(b, cos_o) * bsdf_coat_transmission(b, cos_i) / base);
 }
 
-Bsdf bsdf_of(SurfacePoint s, float cos_o)
+// The surface for light on the side of wo; eta: index beyond it over index here.
+Bsdf bsdf_of(SurfacePoint s, float cos_o, float eta)
 {
     Bsdf b;
     b.diffuse = s.base_color;
@@ -59,14 +78,24 @@ Bsdf bsdf_of(SurfacePoint s, float cos_o)
     b.alpha = 1.0;
     b.f0 = b.f90 = vec3(0.0);
     b.coat_f0 = b.coat_f90 = 0.0;
+    b.glass = b.p_glass = 0.0;
     if (HAS_SPECULAR) {
-        b.diffuse = s.base_color * (1.0 - s.metallic);
-        b.coat_f0 = max_component(s.dielectric_f0);
-        b.coat_f90 = s.dielectric_f90;
-        b.f0 = mix(s.dielectric_f0, s.base_color, s.metallic);
-        b.f90 = mix(vec3(s.dielectric_f90), vec3(1.0), s.metallic);
+        float metallic = s.metallic;
         float alpha = s.roughness * s.roughness;
         b.alpha = alpha < GGX_MIN_ALPHA ? 0.0 : alpha;
+        if (HAS_DIELECTRIC) {
+            b.glass = s.transmission;
+            metallic = b.glass < 1.0 ? min(metallic / (1.0 - b.glass), 1.0) : 0.0;
+            // A dielectric loses little; what the rest reflects is at most its share.
+            b.p_glass = b.glass;
+            bool is_bent = !s.is_solid || abs(eta - 1.0) >= ETA_MATCHED || eta == IOR_INFINITE;
+            b.dielectric = Dielectric(eta, is_bent ? b.alpha : 0.0, s.base_color, s.strength, !s.is_solid);
+        }
+        b.diffuse = s.base_color * (1.0 - metallic);
+        b.coat_f0 = max_component(s.dielectric_f0);
+        b.coat_f90 = s.dielectric_f90;
+        b.f0 = mix(s.dielectric_f0, s.base_color, metallic);
+        b.f90 = mix(vec3(s.dielectric_f90), vec3(1.0), metallic);
         vec3 specular = fresnel_schlick(b.f0, b.f90, cos_o);
         float w_specular = specular.x + specular.y + specular.z;
         vec3 base = b.diffuse * bsdf_coat_transmission(b, cos_o);
@@ -77,8 +106,36 @@ Bsdf bsdf_of(SurfacePoint s, float cos_o)
     return b;
 }
 
-// Value and density of everything but mirrors.
-BsdfValue bsdf_eval(Bsdf b, vec3 wo, vec3 wi)
+// Whether light samples can meet the surface: anything but mirrors and smooth interfaces.
+bool bsdf_has_density(Bsdf b)
+{
+    bool is_mirror = HAS_SPECULAR && b.alpha == 0.0 && b.p_specular == 1.0;
+    if (!HAS_DIELECTRIC) {
+        return !is_mirror;
+    }
+    return (b.glass < 1.0 && !is_mirror) || (b.glass > 0.0 && b.dielectric.alpha > 0.0);
+}
+
+// Whether light can come from the far side other than straight on or refracted by a smooth interface.
+bool bsdf_transmits_widely(Bsdf b)
+{
+    return HAS_DIELECTRIC && b.glass > 0.0 && b.dielectric.alpha > 0.0;
+}
+
+// Whether some light passes on without a change of direction.
+bool bsdf_is_straight(Bsdf b)
+{
+    return HAS_DIELECTRIC && b.glass > 0.0 && dielectric_is_straight(b.dielectric);
+}
+
+// What passes straight on, for a direction at the cosine cos_o.
+vec3 bsdf_straight(Bsdf b, float cos_o)
+{
+    return bsdf_is_straight(b) ? b.glass * dielectric_straight(b.dielectric, cos_o) : vec3(0.0);
+}
+
+// Base, coat and metal without mirrors.
+BsdfValue bsdf_eval_opaque(Bsdf b, vec3 wo, vec3 wi)
 {
     if (wi.z <= 0.0 || wo.z <= 0.0) {
         return BsdfValue(vec3(0.0), 0.0);
@@ -95,15 +152,56 @@ BsdfValue bsdf_eval(Bsdf b, vec3 wo, vec3 wi)
     return v;
 }
 
+// Value and density of everything but mirrors and smooth interfaces. Transmission conserves power (dielectric.glsl).
+BsdfValue bsdf_eval(Bsdf b, vec3 wo, vec3 wi)
+{
+    BsdfValue v = bsdf_eval_opaque(b, wo, wi);
+    if (bsdf_transmits_widely(b)) {
+        vec3 f_cos;
+        float pdf;
+        dielectric_eval(b.dielectric, wo, wi, f_cos, pdf);
+        v.f_cos = mix(v.f_cos, f_cos, b.glass);
+        v.pdf = mix(v.pdf, pdf, b.p_glass);
+    } else if (HAS_DIELECTRIC) {
+        v.f_cos *= 1.0 - b.glass;
+        v.pdf *= 1.0 - b.p_glass;
+    }
+    return v;
+}
+
 // A direction with its weight. u.x chooses the lobe, u.yz the direction.
 BsdfSample bsdf_sample(Bsdf b, vec3 wo, vec3 u)
 {
     BsdfSample result;
     result.is_valid = false;
+    result.is_transmitted = false;
+    result.is_straight = false;
+    float p_opaque = 1.0;
+    if (HAS_DIELECTRIC && b.p_glass > 0.0) {
+        if (u.x < b.p_glass) {
+            DielectricSample s = dielectric_sample(b.dielectric, wo, vec3(u.x / b.p_glass, u.yz));
+            result.wi = s.wi;
+            result.is_transmitted = s.is_transmitted;
+            if (b.dielectric.alpha == 0.0) {
+                result.weight = s.weight * (b.glass / b.p_glass);
+                result.pdf = 0.0;
+                result.is_valid = true;
+                result.is_straight = s.is_transmitted && dielectric_is_straight(b.dielectric);
+                return result;
+            }
+            BsdfValue v = bsdf_eval(b, wo, result.wi);
+            result.pdf = v.pdf;
+            result.is_valid = v.pdf > 0.0 && (result.wi.z < 0.0) == s.is_transmitted;
+            result.weight = result.is_valid ? v.f_cos / v.pdf : vec3(0.0);
+            return result;
+        }
+        p_opaque = 1.0 - b.p_glass;
+        u.x = (u.x - b.p_glass) / p_opaque;
+    }
     if (HAS_SPECULAR && u.x < b.p_specular) {
         if (b.alpha == 0.0) {
             result.wi = vec3(-wo.xy, wo.z);
-            result.weight = fresnel_schlick(b.f0, b.f90, wo.z) / b.p_specular;
+            result.weight = fresnel_schlick(b.f0, b.f90, wo.z) * ((1.0 - b.glass) / (p_opaque * b.p_specular));
             result.pdf = 0.0;
             result.is_valid = true;
             return result;
@@ -121,7 +219,7 @@ BsdfSample bsdf_sample(Bsdf b, vec3 wo, vec3 u)
     }
     BsdfValue v = bsdf_eval(b, wo, result.wi);
     result.pdf = v.pdf;
-    result.is_valid = v.pdf > 0.0;
+    result.is_valid = v.pdf > 0.0 && result.wi.z > 0.0;
     result.weight = result.is_valid ? v.f_cos / v.pdf : vec3(0.0);
     return result;
 }

@@ -89,6 +89,9 @@ void main()
     if (non_finite != 0u) {
         atomicAdd(ledger[LEDGER_NON_FINITE], non_finite);
     }
+    if (HAS_NESTED && interior_overflows != 0u) {
+        atomicAdd(ledger[LEDGER_INTERIOR_OVERFLOWS], interior_overflows);
+    }
     uint subgroup_rays = subgroupAdd(rays);
     if (subgroupElect()) {
         ledger_add(LEDGER_RAYS_LOW, subgroup_rays);

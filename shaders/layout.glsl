@@ -94,6 +94,7 @@ const uint MATERIAL_BLEND = 4u;
 const uint MATERIAL_HAS_TEXTURES = 8u;
 const uint MATERIAL_UNLIT = 16u;
 const uint MATERIAL_EMISSIVE = 32u;     // emission_pdf > 0
+const uint MATERIAL_SOLID = 64u;        // bounds a solid: its back is the inside
 
 // Read as five texels (scene.glsl), so every fourth word starts a group.
 struct Material {
@@ -105,12 +106,12 @@ struct Material {
     float alpha_cutoff;
     float metallic;
     float roughness;            // perceptual
-    vec3 specular_f0;           // ((ior − 1)/(ior + 1))² × specular colour, before clamping
+    vec3 specular_color;        // tint of the dielectric reflection
     float specular;             // strength: scales F0 and is F90
     float normal_scale;
     uint first_texture;         // of TEXTURE_SLOTS entries in `texture_uses`; only with MATERIAL_HAS_TEXTURES
-    uint reserved_0;
-    uint reserved_1;
+    float transmission;         // share of what is not metal that transmits like a dielectric
+    float ior;                  // index of refraction; 0: infinite
 };
 const uint MATERIAL_TEXELS = 5u;
 
@@ -121,7 +122,27 @@ const uint TEXTURE_NORMAL = 2u;
 const uint TEXTURE_EMISSION = 3u;
 const uint TEXTURE_SPECULAR = 4u;
 const uint TEXTURE_SPECULAR_COLOR = 5u;
-const uint TEXTURE_SLOTS = 6u;
+const uint TEXTURE_TRANSMISSION = 6u;
+const uint TEXTURE_SLOTS = 7u;
+
+// --- Media ---------------------------------------------------------------------
+
+const uint PHASE_HENYEY_GREENSTEIN = 0u; // g = 0: isotropic
+const uint PHASE_RAYLEIGH = 1u;
+
+// What fills a solid, and how the solid takes part: entry 0 is the space outside
+// all solids, entry 1 + m the inside of solids with material m. Read as three texels.
+struct Medium {
+    vec3 sigma_t;               // extinction coefficient σ_a + σ_s, 1/m
+    uint phase;                 // PHASE_*
+    vec3 sigma_s;               // scattering coefficient, 1/m
+    float g;                    // mean cosine
+    float ior;                  // index of refraction; 0: infinite
+    uint rank;                  // where solids overlap, the highest fills the space; above 0
+    uint reserved_0;
+    uint reserved_1;
+};
+const uint MEDIUM_TEXELS = 3u;
 
 // A texture applied to a slot. `first_texel` is NONE where the slot is empty.
 struct TextureUse {
@@ -212,7 +233,9 @@ const uint LEDGER_RAYS_HIGH = 3u;
 // Throughput that truncated paths still carried, mean of the channels, in units of 2⁻¹⁶.
 const uint LEDGER_THROUGHPUT_LOW = 4u;
 const uint LEDGER_THROUGHPUT_HIGH = 5u;
-const uint LEDGER_SIZE = 6u;
+// Solids that were entered while INTERIOR_SIZE others already held the point.
+const uint LEDGER_INTERIOR_OVERFLOWS = 6u;
+const uint LEDGER_SIZE = 7u;
 
 const uint TILE = 8u;
 
@@ -234,7 +257,8 @@ const uint BIND_ENV_TABLE = 12u;     // storage: EnvTexel[]
 const uint BIND_SCENE = 13u;         // acceleration structure (ray query)
 const uint BIND_BVH_NODES = 14u;     // texel buffer RGBA32UI, five texels a node (own BVH)
 const uint BIND_BVH_TRIANGLES = 15u; // texel buffer RGBA32UI, three texels a triangle (own BVH)
-const uint BIND_PROBE_RAYS = 16u;    // storage: ProbeRay[] (probe kernel)
-const uint BIND_PROBE_HITS = 17u;    // storage: ProbeHit[] (probe kernel)
+const uint BIND_MEDIA = 16u;         // texel buffer RGBA32UI: Medium[]
+const uint BIND_PROBE_RAYS = 17u;    // storage: ProbeRay[] (probe kernel)
+const uint BIND_PROBE_HITS = 18u;    // storage: ProbeHit[] (probe kernel)
 
 #endif

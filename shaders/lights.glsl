@@ -44,6 +44,9 @@ LightSample light_sample_triangle(Light light, vec3 from, vec2 u)
     vec3 front = ((light.material & LIGHT_MIRRORED) != 0u ? -cross_edges : cross_edges) / doubled_area;
     s.wi = to * inversesqrt(distance2);
     float cosine = -dot(front, s.wi);
+    // The ray stops short of the emitter by the bound on the error of its points.
+    vec3 magnitude = abs(light.position) + abs(light.edge1) + abs(light.edge2);
+    s.target = offset_origin(point, surface_error(magnitude, light.edge1, light.edge2), cosine > 0.0 ? front : -front);
     uint index = light.material & TRIANGLE_MATERIAL_MASK;
     bool is_lit = cosine > 0.0 || (cosine < 0.0 && (light.material & LIGHT_DOUBLE_SIDED) != 0u);
     if (!is_lit || !(distance2 > 0.0)) {
@@ -63,9 +66,6 @@ LightSample light_sample_triangle(Light light, vec3 from, vec2 u)
             return s;
         }
     }
-    // The ray stops short of the emitter by the bound on the error of its points.
-    vec3 magnitude = abs(light.position) + abs(light.edge1) + abs(light.edge2);
-    s.target = offset_origin(point, surface_error(magnitude, light.edge1, light.edge2), cosine > 0.0 ? front : -front);
     float density = params.light_uniform > 0.0 ? params.light_uniform / (0.5 * doubled_area) : light.emission_pdf;
     s.pdf = params.table_choice * density * distance2 / abs(cosine);
     return s;
@@ -98,11 +98,13 @@ LightSample light_sample_punctual(Light light, vec3 from)
     return s;
 }
 
-// A light for the point `from`. pdf 0 stands for "none this time".
+// A light for the point `from`. pdf 0 stands for "none this time". The same u stands
+// for the same point of the same light whatever `from` is.
 LightSample light_sample(vec3 from, vec4 u)
 {
     LightSample s;
     s.pdf = 0.0;
+    s.is_infinite = true;
     float choice = u.x;
     if (HAS_ENVIRONMENT) {
         if (choice < params.env_choice) {

@@ -12,7 +12,9 @@ const uint SLOT_CAMERA = 0u; // x, y: position in the pixel
 const uint SLOT_BSDF = 0u;   // x: lobe, yz: direction, w: roulette
 const uint SLOT_LIGHT = 1u;  // x: which light, yz: point on it, w: alias coin
 const uint SLOT_COVER = 2u;  // x: partial coverage
-const uint SLOT_COUNT = 4u;
+const uint SLOT_MEDIUM = 3u; // x: channel, y: distance, z: distance by the light
+const uint SLOT_SEGMENT = 4u; // as SLOT_LIGHT, for light along a segment
+const uint SLOT_COUNT = 8u;
 
 uvec4 rng_pcg4d(uvec4 v)
 {

@@ -17,6 +17,7 @@ layout(binding = BIND_TEXTURE_USES, scalar) readonly buffer TextureUsesBlock { T
 layout(binding = BIND_TEXELS) uniform usamplerBuffer texels;
 layout(binding = BIND_LIGHTS) uniform usamplerBuffer lights;
 layout(binding = BIND_ENV_MAP) uniform samplerBuffer env_map;
+layout(binding = BIND_MEDIA) uniform usamplerBuffer media;
 layout(binding = BIND_ENV_TABLE, scalar) readonly buffer EnvTableBlock { EnvTexel env_table[]; };
 
 // The material's words; groups that are not used cost nothing.
@@ -30,7 +31,19 @@ Material scene_material(uint index)
     uvec4 e = texelFetch(materials, at + 4);
     vec4 shape = uintBitsToFloat(c);
     return Material(uintBitsToFloat(a.xyz), a.w, uintBitsToFloat(b.xyz), uintBitsToFloat(b.w), shape.x, shape.y, shape.z,
-                    shape.w, uintBitsToFloat(d.xyz), uintBitsToFloat(d.w), uintBitsToFloat(e.x), e.y, e.z, e.w);
+                    shape.w, uintBitsToFloat(d.xyz), uintBitsToFloat(d.w), uintBitsToFloat(e.x), e.y, uintBitsToFloat(e.z),
+                    uintBitsToFloat(e.w));
+}
+
+// What fills solids with this material; NONE: the space outside all solids. Groups that are not used cost nothing.
+Medium scene_medium(uint material)
+{
+    int at = int(MEDIUM_TEXELS * (material + 1u));
+    uvec4 a = texelFetch(media, at);
+    uvec4 b = texelFetch(media, at + 1);
+    uvec4 c = texelFetch(media, at + 2);
+    return Medium(uintBitsToFloat(a.xyz), a.w, uintBitsToFloat(b.xyz), uintBitsToFloat(b.w), uintBitsToFloat(c.x), c.y,
+                  c.z, c.w);
 }
 
 // An entry of the light table; groups that are not used cost nothing.

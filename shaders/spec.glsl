@@ -15,7 +15,14 @@ layout(constant_id = 7) const bool HAS_AREA_LIGHTS = true; // emissive triangles
 layout(constant_id = 8) const bool HAS_PUNCTUAL = true;    // point, spot, directional
 layout(constant_id = 9) const bool HAS_INSTANCES = true;   // groups that are not in world space
 layout(constant_id = 10) const bool HAS_AOVS = true;
-layout(constant_id = 11) const uint STRATEGY = 0u;         // STRATEGY_*
+layout(constant_id = 11) const bool HAS_DIELECTRIC = true; // any material that transmits
+layout(constant_id = 12) const bool HAS_PASSAGE = true;    // shadow rays may go through smooth sheets or boundaries
+layout(constant_id = 13) const bool HAS_NESTED = true;     // solids that may overlap or touch
+layout(constant_id = 14) const bool HAS_INSIDE = true;     // the camera may be inside a solid
+layout(constant_id = 15) const bool HAS_MEDIA = true;      // anything that absorbs or scatters
+layout(constant_id = 16) const bool HAS_SCATTERING = true; // media that scatter
+layout(constant_id = 17) const bool HAS_EQUIANGULAR = true; // distances in them are also sampled by the lights
+layout(constant_id = 18) const uint STRATEGY = 0u;         // STRATEGY_*
 
 const uint STRATEGY_MIS = 0u;
 const uint STRATEGY_LIGHT_ONLY = 1u;

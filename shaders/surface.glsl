@@ -34,7 +34,15 @@ struct SurfacePoint {
     float roughness;   // perceptual
     vec3 dielectric_f0;
     float dielectric_f90;
+    uint material;     // its record
+    bool is_solid;     // bounds a solid, whose inside is the back; else a transmissive surface is a sheet
+    float transmission; // share of what is not metal that transmits like a dielectric
+    float ior;         // of the solid or the sheet; 0 is infinite
+    vec3 strength;     // factor on a dielectric's reflection
 };
+
+// With HAS_NESTED: (instance, primitive) that rays pass as if it were not there.
+uvec2 surface_skip = uvec2(NONE);
 
 // World-space corner and edges of a triangle, with the error of points on it.
 struct TriangleShape {
@@ -143,20 +151,12 @@ vec4 surface_base_color(Material material, uvec4 triangle, vec2 bary)
 
 bool surface_is_opaque(uint instance, uint primitive, vec2 bary)
 {
+    if (HAS_NESTED && uvec2(instance, primitive) == surface_skip) {
+        return false;
+    }
     uvec4 triangle = surface_triangle(instance, primitive);
     Material material = scene_material(triangle.w & TRIANGLE_MATERIAL_MASK);
     return surface_base_color(material, triangle, bary).a >= material.alpha_cutoff;
-}
-
-// Fraction of the light that the surface stops.
-float surface_coverage(uint instance, uint primitive, vec2 bary)
-{
-    uvec4 triangle = surface_triangle(instance, primitive);
-    Material material = scene_material(triangle.w & TRIANGLE_MATERIAL_MASK);
-    if ((material.flags & MATERIAL_BLEND) == 0u) {
-        return 1.0;
-    }
-    return clamp(surface_base_color(material, triangle, bary).a, 0.0, 1.0);
 }
 
 // Radiance that leaves a point of an emitter, before its side is asked.
@@ -238,6 +238,24 @@ vec3 surface_mapped_normal(Material material, uint instance, uvec4 triangle, Tri
     return mapped2 > 0.0 ? mapped * inversesqrt(mapped2) : n;
 }
 
+// What a solid's boundary is, without its shading.
+struct SurfaceSide {
+    uint material;
+    bool is_solid;
+    bool is_front; // a ray along d comes from the side that the winding calls front
+};
+
+SurfaceSide surface_side(Hit hit, vec3 d)
+{
+    uvec4 triangle = surface_triangle(hit.instance, hit.primitive);
+    TriangleShape shape = surface_shape(hit.instance, triangle);
+    SurfaceSide side;
+    side.material = triangle.w & TRIANGLE_MATERIAL_MASK;
+    side.is_solid = (scene_material(side.material).flags & MATERIAL_SOLID) != 0u;
+    side.is_front = (dot(cross(shape.e1, shape.e2), d) <= 0.0) != shape.is_mirrored;
+    return side;
+}
+
 // Everything about the point that a ray from direction −wo met.
 SurfacePoint surface_point(Hit hit, vec3 wo)
 {
@@ -285,13 +303,27 @@ SurfacePoint surface_point(Hit hit, vec3 wo)
     s.roughness = 1.0;
     s.dielectric_f0 = vec3(0.0);
     s.dielectric_f90 = 0.0;
+    s.material = NONE;
+    s.is_solid = false;
+    s.transmission = 0.0;
+    s.ior = 1.0;
+    s.strength = vec3(1.0);
     if (HAS_SPECULAR) {
         vec4 factors = surface_texture(material, TEXTURE_METALLIC_ROUGHNESS, triangle, hit.bary);
         s.roughness = material.roughness * factors.g;
         s.metallic = material.metallic * factors.b;
         s.dielectric_f90 = material.specular * surface_texture(material, TEXTURE_SPECULAR, triangle, hit.bary).a;
         vec3 tint = surface_texture(material, TEXTURE_SPECULAR_COLOR, triangle, hit.bary).rgb;
-        s.dielectric_f0 = min(material.specular_f0 * tint, vec3(1.0)) * s.dielectric_f90;
+        s.strength = material.specular_color * tint * s.dielectric_f90;
+        float f0 = material.ior == 0.0 ? 1.0 : square((material.ior - 1.0) / (material.ior + 1.0));
+        s.dielectric_f0 = min(f0 * material.specular_color * tint, vec3(1.0)) * s.dielectric_f90;
+        s.ior = material.ior;
+    }
+    if (HAS_DIELECTRIC) {
+        s.material = triangle.w & TRIANGLE_MATERIAL_MASK;
+        s.is_solid = (material.flags & MATERIAL_SOLID) != 0u;
+        s.transmission = (1.0 - s.metallic) * material.transmission
+            * surface_texture(material, TEXTURE_TRANSMISSION, triangle, hit.bary).r;
     }
     return s;
 }

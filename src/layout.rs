@@ -101,10 +101,20 @@ shared! {
         alpha_cutoff: f32,
         metallic: f32,
         roughness: f32,
-        specular_f0: [f32; 3],
+        specular_color: [f32; 3],
         specular: f32,
         normal_scale: f32,
         first_texture: u32,
+        transmission: f32,
+        ior: f32,
+    }
+    Medium {
+        sigma_t: [f32; 3],
+        phase: u32,
+        sigma_s: [f32; 3],
+        g: f32,
+        ior: f32,
+        rank: u32,
         reserved_0: u32,
         reserved_1: u32,
     }
@@ -168,6 +178,7 @@ tags! {
     MATERIAL_HAS_TEXTURES = 8;
     MATERIAL_UNLIT = 16;
     MATERIAL_EMISSIVE = 32;
+    MATERIAL_SOLID = 64;
     MATERIAL_TEXELS = 5;
     TEXTURE_BASE_COLOR = 0;
     TEXTURE_METALLIC_ROUGHNESS = 1;
@@ -175,7 +186,11 @@ tags! {
     TEXTURE_EMISSION = 3;
     TEXTURE_SPECULAR = 4;
     TEXTURE_SPECULAR_COLOR = 5;
-    TEXTURE_SLOTS = 6;
+    TEXTURE_TRANSMISSION = 6;
+    TEXTURE_SLOTS = 7;
+    PHASE_HENYEY_GREENSTEIN = 0;
+    PHASE_RAYLEIGH = 1;
+    MEDIUM_TEXELS = 3;
     FORMAT_RGBA8 = 0;
     FORMAT_SRGB8 = 1;
     FORMAT_RGBA16 = 2;
@@ -201,7 +216,8 @@ tags! {
     LEDGER_RAYS_HIGH = 3;
     LEDGER_THROUGHPUT_LOW = 4;
     LEDGER_THROUGHPUT_HIGH = 5;
-    LEDGER_SIZE = 6;
+    LEDGER_INTERIOR_OVERFLOWS = 6;
+    LEDGER_SIZE = 7;
     TILE = 8;
     BIND_PARAMS = 0;
     BIND_FILM = 1;
@@ -219,6 +235,7 @@ tags! {
     BIND_SCENE = 13;
     BIND_BVH_NODES = 14;
     BIND_BVH_TRIANGLES = 15;
-    BIND_PROBE_RAYS = 16;
-    BIND_PROBE_HITS = 17;
+    BIND_MEDIA = 16;
+    BIND_PROBE_RAYS = 17;
+    BIND_PROBE_HITS = 18;
 }

@@ -30,13 +30,28 @@ pub struct Spec {
     pub instances: bool,
     /// Layers of the first hit.
     pub aovs: bool,
+    /// Any material that transmits.
+    pub dielectric: bool,
+    /// Shadow rays may go through smooth sheets or boundaries.
+    pub passage: bool,
+    /// Solids that may overlap or touch.
+    pub nested: bool,
+    /// The camera may be inside a solid.
+    pub inside: bool,
+    /// Anything that absorbs or scatters.
+    pub media: bool,
+    /// Media that scatter.
+    pub scattering: bool,
+    /// Distances in them are also sampled by the lights.
+    pub equiangular: bool,
     /// How direct light is found.
     pub strategy: Strategy,
 }
 
 impl Spec {
-    /// What the scene needs, before geometry is uploaded. `normals`,
-    /// `attributes` and `instances` are settled by the upload, which sees the meshes.
+    /// What the scene needs, before geometry is uploaded. `normals`, `attributes`,
+    /// `instances`, `nested`, `inside` and `equiangular` are settled by the upload,
+    /// which sees the meshes and the lights.
     pub fn for_scene(scene: &Scene, settings: &Settings) -> Self {
         let mut spec = Self {
             aovs: settings.aovs,
@@ -61,11 +76,20 @@ impl Spec {
             spec.blend |= material.alpha_mode == AlphaMode::Blend;
             spec.specular |= is_specular(material);
             spec.area_lights |= is_emissive(material);
+            spec.dielectric |= is_transmissive(material);
+            spec.passage |= is_transmissive(material) && may_pass(material);
+            let inside = material.volume.as_ref().map(|v| &v.medium);
+            spec.media |= inside.is_some_and(|m| !m.is_clear());
+            spec.scattering |= inside.is_some_and(|m| m.scattering != glam::Vec3::ZERO);
+        }
+        if let Some(outside) = &scene.medium {
+            spec.media |= !outside.is_clear();
+            spec.scattering |= outside.scattering != glam::Vec3::ZERO;
         }
         spec
     }
 
-    /// Everything switched on: must give the same picture.
+    /// Everything switched on that needs no other data or numbers: must give the same picture.
     pub fn with_everything(self) -> Self {
         Self {
             textures: true,
@@ -79,12 +103,19 @@ impl Spec {
             punctual: true,
             instances: self.instances,
             aovs: self.aovs,
+            dielectric: true,
+            passage: true,
+            nested: self.nested,
+            inside: true,
+            media: true,
+            scattering: true,
+            equiangular: self.equiangular,
             strategy: self.strategy,
         }
     }
 
     /// Names of the features with their state, for people and files.
-    pub fn features(&self) -> [(&'static str, bool); 11] {
+    pub fn features(&self) -> [(&'static str, bool); 18] {
         [
             ("textures", self.textures),
             ("alpha", self.alpha),
@@ -97,6 +128,13 @@ impl Spec {
             ("punctual", self.punctual),
             ("instances", self.instances),
             ("aovs", self.aovs),
+            ("dielectric", self.dielectric),
+            ("passage", self.passage),
+            ("nested", self.nested),
+            ("inside", self.inside),
+            ("media", self.media),
+            ("scattering", self.scattering),
+            ("equiangular", self.equiangular),
         ]
     }
 
@@ -121,6 +159,7 @@ pub(crate) fn has_textures(m: &Material) -> bool {
         m.emission_texture,
         m.specular_texture,
         m.specular_color_texture,
+        m.transmission_texture,
     ]
     .iter()
     .any(Option::is_some)
@@ -137,7 +176,21 @@ pub(crate) fn is_emissive(m: &Material) -> bool {
 
 /// Whether the material reflects other than as pure Lambert.
 fn is_specular(m: &Material) -> bool {
-    !m.unlit && (m.metallic > 0.0 || m.specular > 0.0)
+    !m.unlit && (m.metallic > 0.0 || m.specular > 0.0 || m.transmission > 0.0)
+}
+
+/// Whether light can go through the surface.
+pub(crate) fn is_transmissive(m: &Material) -> bool {
+    !m.unlit && m.metallic < 1.0 && m.transmission > 0.0
+}
+
+/// Whether light may go straight through a transmissive surface: a smooth sheet, or a boundary without an index.
+fn may_pass(m: &Material) -> bool {
+    let is_smooth = m.roughness < 0.04 || m.metallic_roughness_texture.is_some();
+    match m.volume {
+        None => is_smooth,
+        Some(_) => (m.ior - 1.0).abs() < 1e-3,
+    }
 }
 
 macro_rules! spirv {

@@ -121,6 +121,13 @@ fn features_switch_the_constant_of_their_name() {
             "punctual" => spec.punctual = true,
             "instances" => spec.instances = true,
             "aovs" => spec.aovs = true,
+            "dielectric" => spec.dielectric = true,
+            "passage" => spec.passage = true,
+            "nested" => spec.nested = true,
+            "inside" => spec.inside = true,
+            "media" => spec.media = true,
+            "scattering" => spec.scattering = true,
+            "equiangular" => spec.equiangular = true,
             _ => panic!("{name} is not a field of Spec that this test knows"),
         }
         let on: Vec<u32> = spec

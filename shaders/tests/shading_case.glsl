@@ -29,7 +29,8 @@ Bsdf case_bsdf(Case c, float cos_o)
     s.roughness = c.roughness;
     s.dielectric_f0 = c.f0;
     s.dielectric_f90 = c.f90;
-    return bsdf_of(s, cos_o);
+    s.transmission = 0.0;
+    return bsdf_of(s, cos_o, 1.0);
 }
 
 #endif

@@ -4,6 +4,7 @@
 
 use glam::{DAffine3, DMat3, DVec3, Vec3};
 
+use super::solids::Solids;
 use crate::layout;
 use crate::scene::{AlphaMode, Mesh, Scene};
 
@@ -55,8 +56,8 @@ pub struct Geometry {
 }
 
 impl Geometry {
-    /// Flattens the scene; `copy_limit` as in [`DEFAULT_COPY_LIMIT`].
-    pub fn new(scene: &Scene, copy_limit: usize) -> Self {
+    /// Flattens the scene; `copy_limit` as in [`DEFAULT_COPY_LIMIT`], `solids` as [`Solids::of`] finds them.
+    pub fn new(scene: &Scene, solids: &Solids, copy_limit: usize) -> Self {
         let (low, high) = scene.bounds().unwrap_or_default();
         let centre = 0.5 * (low + high);
         let radius = 0.5 * (high - low).length();
@@ -92,20 +93,36 @@ impl Geometry {
             .sum();
         let is_shared = |mesh: u32| uses[mesh as usize] > 1 && copied > copy_limit;
 
-        for instance in scene.instances.iter().filter(|i| !is_shared(i.mesh)) {
+        let records = || scene.instances.iter().zip(&solids.records);
+        for (instance, record) in records().filter(|(i, _)| !is_shared(i.mesh)) {
             let place = DAffine3 {
                 translation: instance.world_from_object.translation - origin,
                 ..instance.world_from_object
             };
-            geometry.append(scene, instance.mesh, &place, has_attributes);
+            geometry.append(
+                scene,
+                instance.mesh,
+                *record,
+                solids,
+                &place,
+                has_attributes,
+            );
         }
         geometry.groups[0].triangles = 0..geometry.triangles.len();
 
         let mut group_of = vec![None; scene.meshes.len()];
-        for instance in scene.instances.iter().filter(|i| is_shared(i.mesh)) {
+        for (instance, record) in records().filter(|(i, _)| is_shared(i.mesh)) {
             let group = *group_of[instance.mesh as usize].get_or_insert_with(|| {
                 let first = geometry.triangles.len();
-                geometry.append(scene, instance.mesh, &DAffine3::IDENTITY, has_attributes);
+                let place = DAffine3::IDENTITY;
+                geometry.append(
+                    scene,
+                    instance.mesh,
+                    *record,
+                    solids,
+                    &place,
+                    has_attributes,
+                );
                 let triangles = first..geometry.triangles.len();
                 geometry.groups.push(Group {
                     triangles,
@@ -151,8 +168,16 @@ impl Geometry {
         16 * texels as u64
     }
 
-    /// Appends one mesh, carried by `place`.
-    fn append(&mut self, scene: &Scene, mesh: u32, place: &DAffine3, has_attributes: bool) {
+    /// Appends one mesh with a material record, carried by `place`.
+    fn append(
+        &mut self,
+        scene: &Scene,
+        mesh: u32,
+        record: u32,
+        solids: &Solids,
+        place: &DAffine3,
+        has_attributes: bool,
+    ) {
         let mesh = &scene.meshes[mesh as usize];
         let material = &scene.materials[mesh.material as usize];
         let first = (self.vertices.len() / 2) as u32;
@@ -182,14 +207,16 @@ impl Geometry {
             }
         }
 
-        let mut flags = mesh.material;
+        let mut flags = record;
         if !mesh.tangents.is_empty() {
             flags |= layout::TRIANGLE_HAS_TANGENTS;
         }
         if !mesh.colors.is_empty() {
             flags |= layout::TRIANGLE_HAS_COLORS;
         }
-        if matches!(material.alpha_mode, AlphaMode::Mask { .. }) {
+        // Rays skip a boundary of overlapping solids that they just crossed, which asks for the same test as cut-outs.
+        let is_skipped = solids.are_nested && material.volume.is_some();
+        if is_skipped || matches!(material.alpha_mode, AlphaMode::Mask { .. }) {
             flags |= layout::TRIANGLE_IS_MASKED;
         }
         for (triangle, is_curved) in mesh.triangles.iter().zip(curved(mesh)) {

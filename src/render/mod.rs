@@ -4,10 +4,13 @@
 
 pub mod geometry;
 mod lights;
+mod media;
 mod passes;
 mod report;
+pub mod solids;
 mod traversal;
 mod upload;
+mod view;
 mod vulkan;
 
 use std::time::Instant;

@@ -73,6 +73,8 @@ pub struct Ledger {
     pub truncated_paths: u64,
     /// Their throughput, mean of the channels, summed.
     pub truncated_throughput: f64,
+    /// Solids that were entered while the most that are tracked already held the point; their boundaries were missed.
+    pub interior_overflows: u64,
 }
 
 /// How a render went.

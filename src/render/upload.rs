@@ -1,14 +1,16 @@
 //! Scene → the arrays that the kernels read: the only writer of the shared
 //! structs, apart from the batches.
 
-use glam::{DMat4, DVec3, Vec3};
+use glam::{DVec3, Vec3};
 
 use super::geometry::Geometry;
 use super::lights::{self, Emitter, LightTable};
+use super::media;
+use super::solids::Solids;
+use super::view::{camera_origins, params};
 use crate::layout;
 use crate::scene::{
-    AlphaMode, Camera, Environment, Filter, Material, Projection, Scene, Texels, Texture,
-    TextureRef, Wrap,
+    AlphaMode, Environment, Filter, Material, Scene, Texels, Texture, TextureRef, Wrap,
 };
 use crate::settings::{Estimator, Settings};
 use crate::spec::{self, Spec};
@@ -24,6 +26,7 @@ pub(crate) struct SceneData {
     pub params: layout::Params,
     pub instances: Vec<layout::Instance>,
     pub materials: Vec<layout::Material>,
+    pub media: Vec<layout::Medium>,
     pub texture_uses: Vec<layout::TextureUse>,
     pub texels: Vec<u32>,
     pub lights: Vec<layout::Light>,
@@ -34,12 +37,17 @@ pub(crate) struct SceneData {
 impl SceneData {
     /// Prepares the scene for the settings; `copy_limit` as in [`super::geometry::DEFAULT_COPY_LIMIT`].
     pub fn new(scene: &Scene, settings: &Settings, copy_limit: usize) -> Self {
-        let geometry = Geometry::new(scene, copy_limit);
+        let solids = Solids::of(scene);
+        let geometry = Geometry::new(scene, &solids, copy_limit);
         let mut spec = Spec::for_scene(scene, settings);
         spec.normals =
             geometry.has_normals || scene.materials.iter().any(|m| m.normal_texture.is_some());
         spec.attributes = !geometry.attributes.is_empty();
         spec.instances = geometry.has_instances();
+        spec.inside = solids.may_hold(camera_origins(scene, settings));
+        if solids.are_nested {
+            (spec.nested, spec.passage, spec.alpha) = (true, true, true);
+        }
 
         let (texels, first_texels) = texels(&scene.textures);
         let mut data = Self {
@@ -47,6 +55,7 @@ impl SceneData {
             params: params(scene, settings, &geometry),
             instances: instances(&geometry),
             materials: Vec::new(),
+            media: media::table(scene, &solids),
             texture_uses: Vec::new(),
             texels,
             lights: Vec::new(),
@@ -54,14 +63,13 @@ impl SceneData {
             env_table: Vec::new(),
             geometry,
         };
-        let emissions: Vec<f64> = scene
-            .materials
-            .iter()
+        let emissions: Vec<f64> = solids
+            .materials(scene)
             .map(|m| mean_emission(m, &scene.textures))
             .collect();
-        data.add_materials(scene, &first_texels);
+        data.add_materials(scene, &solids, &first_texels);
         let env_power = data.add_environment(scene);
-        data.add_lights(scene, settings, &emissions, env_power);
+        data.add_lights(scene, settings, &solids, &emissions, env_power);
         data
     }
 
@@ -70,8 +78,8 @@ impl SceneData {
         (4 * self.texels.len() + 16 * self.env_map.len() + 12 * self.env_table.len()) as u64
     }
 
-    fn add_materials(&mut self, scene: &Scene, first_texels: &[u32]) {
-        for m in &scene.materials {
+    fn add_materials(&mut self, scene: &Scene, solids: &Solids, first_texels: &[u32]) {
+        for m in solids.materials(scene) {
             let mut record = material(m);
             if spec::has_textures(m) {
                 record.flags |= layout::MATERIAL_HAS_TEXTURES;
@@ -88,6 +96,7 @@ impl SceneData {
                     emission,
                     m.specular_texture,
                     m.specular_color_texture,
+                    m.transmission_texture,
                 ];
                 self.texture_uses
                     .extend(slots.map(|slot| texture_use(slot, &scene.textures, first_texels)));
@@ -135,10 +144,11 @@ impl SceneData {
         &mut self,
         scene: &Scene,
         settings: &Settings,
+        solids: &Solids,
         emissions: &[f64],
         env_power: f64,
     ) {
-        let mut emitters = self.emissive_triangles(scene, emissions);
+        let mut emitters = self.emissive_triangles(scene, solids, emissions);
         self.spec.area_lights = !emitters.is_empty();
         let triangles = emitters.len();
         for light in &scene.lights {
@@ -146,6 +156,8 @@ impl SceneData {
             emitters.extend(lights::punctual(light, position, self.geometry.radius));
         }
         self.spec.punctual = emitters.len() > triangles;
+        self.spec.equiangular =
+            self.spec.scattering && settings.estimator == Estimator::Full && !emitters.is_empty();
 
         let is_uniform = settings.estimator == Estimator::Textbook;
         let count = emitters.len();
@@ -182,7 +194,12 @@ impl SceneData {
     }
 
     /// Every placed triangle that emits, with its power: π · radiance · area · sides.
-    fn emissive_triangles(&self, scene: &Scene, emissions: &[f64]) -> Vec<Emitter> {
+    fn emissive_triangles(
+        &self,
+        scene: &Scene,
+        solids: &Solids,
+        emissions: &[f64],
+    ) -> Vec<Emitter> {
         let mut emitters = Vec::new();
         for placement in &self.geometry.placements {
             for triangle in self.geometry.groups[placement.group].triangles.clone() {
@@ -201,7 +218,7 @@ impl SceneData {
                 let power = std::f64::consts::PI * emission * area * sides(record.flags);
                 if power > 0.0 {
                     let is_mirrored = placement.world_from_object.matrix3.determinant() < 0.0;
-                    let flags = light_flags(scene, material, record, is_mirrored);
+                    let flags = light_flags(scene, solids.origin(material), record, is_mirrored);
                     let light = layout::Light {
                         kind: layout::LIGHT_TRIANGLE,
                         position: a.as_vec3().to_array(),
@@ -314,12 +331,9 @@ fn material(m: &Material) -> layout::Material {
         }
         AlphaMode::Blend => flags |= layout::MATERIAL_BLEND,
     }
-    // The index enters through normal incidence alone; 0 stands for an infinite one.
-    let f0 = if m.ior == 0.0 {
-        1.0
-    } else {
-        ((m.ior - 1.0) / (m.ior + 1.0)).powi(2)
-    };
+    if m.volume.is_some() {
+        flags |= layout::MATERIAL_SOLID;
+    }
     let mut record = layout::Material {
         base_color: m.base_color.truncate().to_array(),
         flags,
@@ -328,7 +342,9 @@ fn material(m: &Material) -> layout::Material {
         alpha_cutoff,
         metallic: m.metallic,
         roughness: m.roughness,
-        specular_f0: (f0 * m.specular_color).to_array(),
+        specular_color: m.specular_color.to_array(),
+        transmission: m.transmission,
+        ior: m.ior,
         specular: m.specular,
         normal_scale: m.normal_scale,
         ..Default::default()
@@ -338,6 +354,8 @@ fn material(m: &Material) -> layout::Material {
         record.emission = record.base_color;
         record.metallic = 0.0;
         record.specular = 0.0;
+        record.transmission = 0.0;
+        record.flags &= !layout::MATERIAL_SOLID;
     }
     record
 }
@@ -435,61 +453,4 @@ fn instances(geometry: &Geometry) -> Vec<layout::Instance> {
             }
         })
         .collect()
-}
-
-/// Camera, frame and limits; lights and environment are filled in later.
-fn params(scene: &Scene, settings: &Settings, geometry: &Geometry) -> layout::Params {
-    let aspect = f64::from(settings.width) / f64::from(settings.height);
-    let framing;
-    let camera: &Camera = match scene.cameras.get(settings.camera.unwrap_or(0)) {
-        Some(camera) => camera,
-        None => {
-            framing = scene.framing_camera(aspect);
-            &framing
-        }
-    };
-    let pose = DMat4::from(camera.world_from_camera);
-    let (right, up, back) = (
-        pose.x_axis.truncate(),
-        pose.y_axis.truncate(),
-        pose.z_axis.truncate(),
-    );
-    let (half_width, half_height, kind) = match camera.projection {
-        // The vertical angle holds; the width follows from the picture.
-        Projection::Perspective { yfov, .. } => {
-            let half = (0.5 * f64::from(yfov)).tan();
-            (half * aspect, half, layout::CAMERA_PERSPECTIVE)
-        }
-        Projection::Orthographic { ymag, .. } => {
-            let half = f64::from(ymag);
-            (half * aspect, half, layout::CAMERA_ORTHOGRAPHIC)
-        }
-    };
-    let window = settings.window();
-    let (width, height) = (window.x1 - window.x0, window.y1 - window.y0);
-    layout::Params {
-        camera_position: (pose.w_axis.truncate() - geometry.origin)
-            .as_vec3()
-            .to_array(),
-        camera_kind: kind,
-        camera_right: (right * half_width).as_vec3().to_array(),
-        width: settings.width,
-        camera_up: (up * half_height).as_vec3().to_array(),
-        height: settings.height,
-        camera_forward: (-back).as_vec3().to_array(),
-        window_x: window.x0,
-        window_y: window.y0,
-        window_width: width,
-        window_height: height,
-        tiles_x: width.div_ceil(layout::TILE),
-        tiles_y: height.div_ceil(layout::TILE),
-        seed_low: settings.seed as u32,
-        seed_high: (settings.seed >> 32) as u32,
-        max_depth: if settings.max_depth == 0 {
-            layout::NONE
-        } else {
-            settings.max_depth
-        },
-        ..Default::default()
-    }
 }

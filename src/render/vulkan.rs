@@ -181,6 +181,11 @@ impl VulkanBackend {
                 )?,
             ),
             (
+                layout::BIND_MEDIA,
+                BindingKind::Texel,
+                texel(device, "media", RECORDS, &data.media, false)?,
+            ),
+            (
                 layout::BIND_ENV_TABLE,
                 storage,
                 upload(device, "environment table", &data.env_table)?,
@@ -340,6 +345,7 @@ impl VulkanBackend {
             non_finite: word(layout::LEDGER_NON_FINITE),
             truncated_paths: word(layout::LEDGER_TRUNCATED),
             truncated_throughput: pair(layout::LEDGER_THROUGHPUT_LOW) as f64 / 65_536.0,
+            interior_overflows: word(layout::LEDGER_INTERIOR_OVERFLOWS),
         };
         Ok((pair(layout::LEDGER_RAYS_LOW), ledger))
     }
