@@ -23,6 +23,7 @@ const SHADERS: &[(&str, &[&str], &str)] = &[
     ("tests/shading_values.comp", &[], "test_shading_values"),
     ("tests/shading_random.comp", &[], "test_shading_random"),
     ("tests/shading_scene.comp", &[], "test_shading_scene"),
+    ("examples/needle.comp", &[], "example_needle"),
 ];
 
 fn main() {

@@ -68,7 +68,7 @@ fn rust() -> Vec<(String, String)> {
 /// Everything that people write, without the documents.
 fn code() -> Vec<(String, String)> {
     let mut all = files(
-        &["src", "shaders", "tests", "scripts", "build.rs"],
+        &["src", "shaders", "examples", "tests", "scripts", "build.rs"],
         &["rs", "glsl", "comp", "sh"],
     );
     // This file names the words that it forbids.
@@ -221,7 +221,7 @@ fn architecture_document_names_every_file() {
             }
         }
     }
-    let real: BTreeSet<String> = files(&["src", "shaders"], &["rs", "glsl", "comp"])
+    let real: BTreeSet<String> = files(&["src", "shaders", "examples"], &["rs", "glsl", "comp"])
         .into_iter()
         .map(|(path, _)| path)
         .filter(|path| !path.starts_with("shaders/tests/"))
