@@ -173,42 +173,34 @@ BsdfValue bsdf_eval(Bsdf b, vec3 wo, vec3 wi)
 BsdfSample bsdf_sample(Bsdf b, vec3 wo, vec3 u)
 {
     BsdfSample result;
-    result.is_valid = false;
+    result.is_valid = true;
     result.is_transmitted = false;
     result.is_straight = false;
+    result.pdf = 0.0;
     float p_opaque = 1.0;
-    if (HAS_DIELECTRIC && b.p_glass > 0.0) {
-        if (u.x < b.p_glass) {
-            DielectricSample s = dielectric_sample(b.dielectric, wo, vec3(u.x / b.p_glass, u.yz));
-            result.wi = s.wi;
-            result.is_transmitted = s.is_transmitted;
-            if (b.dielectric.alpha == 0.0) {
-                result.weight = s.weight * (b.glass / b.p_glass);
-                result.pdf = 0.0;
-                result.is_valid = true;
-                result.is_straight = s.is_transmitted && dielectric_is_straight(b.dielectric);
-                return result;
-            }
-            BsdfValue v = bsdf_eval(b, wo, result.wi);
-            result.pdf = v.pdf;
-            result.is_valid = v.pdf > 0.0 && (result.wi.z < 0.0) == s.is_transmitted;
-            result.weight = result.is_valid ? v.f_cos / v.pdf : vec3(0.0);
+    bool is_glass = HAS_DIELECTRIC && u.x < b.p_glass;
+    if (is_glass) {
+        DielectricSample s = dielectric_sample(b.dielectric, wo, vec3(u.x / b.p_glass, u.yz));
+        result.wi = s.wi;
+        result.is_transmitted = s.is_transmitted;
+        if (b.dielectric.alpha == 0.0) {
+            result.weight = s.weight * (b.glass / b.p_glass);
+            result.is_straight = s.is_transmitted && dielectric_is_straight(b.dielectric);
             return result;
         }
+    } else if (HAS_DIELECTRIC) {
         p_opaque = 1.0 - b.p_glass;
         u.x = (u.x - b.p_glass) / p_opaque;
     }
-    if (HAS_SPECULAR && u.x < b.p_specular) {
+    if (!is_glass && HAS_SPECULAR && u.x < b.p_specular) {
         if (b.alpha == 0.0) {
             result.wi = vec3(-wo.xy, wo.z);
             result.weight = fresnel_schlick(b.f0, b.f90, wo.z) * ((1.0 - b.glass) / (p_opaque * b.p_specular));
-            result.pdf = 0.0;
-            result.is_valid = true;
             return result;
         }
         vec3 m = ggx_sample_normal(wo, b.alpha, u.yz);
         result.wi = 2.0 * dot(wo, m) * m - wo;
-    } else {
+    } else if (!is_glass) {
         result.wi = sample_cosine_hemisphere(u.yz);
         if (!HAS_SPECULAR) {
             result.weight = b.diffuse;
@@ -219,7 +211,7 @@ BsdfSample bsdf_sample(Bsdf b, vec3 wo, vec3 u)
     }
     BsdfValue v = bsdf_eval(b, wo, result.wi);
     result.pdf = v.pdf;
-    result.is_valid = v.pdf > 0.0 && result.wi.z > 0.0;
+    result.is_valid = v.pdf > 0.0 && (result.wi.z < 0.0) == result.is_transmitted;
     result.weight = result.is_valid ? v.f_cos / v.pdf : vec3(0.0);
     return result;
 }

@@ -105,30 +105,31 @@ void dielectric_eval(Dielectric d, vec3 wo, vec3 wi, out vec3 f_cos, out float p
         return;
     }
     bool is_reflected = wi.z > 0.0;
-    if (is_reflected || d.is_thin) {
-        // What passes a rough sheet leaves like the mirror image of what it reflects.
-        vec3 mirrored = vec3(wi.xy, abs(wi.z));
-        vec3 m = normalize(wo + mirrored);
-        DielectricSplit split = dielectric_split(d, dot(wo, m));
-        f_cos = (is_reflected ? split.r : split.t)
-            * (ggx_d(m, d.alpha) * ggx_visibility(wo.z, mirrored.z, d.alpha) * mirrored.z);
-        pdf = (is_reflected ? split.p_reflect : 1.0 - split.p_reflect) * ggx_pdf(wo.z, m, d.alpha);
-        return;
-    }
-    // [Walter07] Eq. 16, 17 and 21; radiance's n² left out.
-    vec3 m = wo + d.eta * wi;
+    // What passes a rough sheet leaves like the mirror image of what it reflects.
+    bool is_refracted = !is_reflected && !d.is_thin;
+    // [Walter07] Eq. 13 and 16
+    vec3 m = is_refracted ? wo + d.eta * wi : wo + vec3(wi.xy, abs(wi.z));
     m = normalize(m.z < 0.0 ? -m : m);
     float cos_o = dot(wo, m);
+    DielectricSplit split = dielectric_split(d, cos_o);
+    vec3 share = is_reflected ? split.r : split.t;
+    float p = is_reflected ? split.p_reflect : 1.0 - split.p_reflect;
+    float distribution = ggx_d(m, d.alpha);
+    if (!is_refracted) {
+        f_cos = share * (distribution * ggx_visibility(wo.z, abs(wi.z), d.alpha) * abs(wi.z));
+        pdf = p * ggx_pdf(wo.z, m, d.alpha);
+        return;
+    }
     float cos_i = dot(wi, m);
     if (cos_o <= 0.0 || cos_i >= 0.0) {
         return;
     }
-    DielectricSplit split = dielectric_split(d, cos_o);
+    // [Walter07] Eq. 17 and 21; radiance's n² left out.
     float root = cos_o + d.eta * cos_i;
     float jacobian = d.eta * d.eta * -cos_i / (root * root);
-    float visible = ggx_d(m, d.alpha) * dielectric_masking(wo.z, d.alpha) * cos_o / wo.z;
-    f_cos = split.t * (visible * dielectric_masking(-wi.z, d.alpha) * jacobian);
-    pdf = (1.0 - split.p_reflect) * visible * jacobian;
+    float visible = distribution * dielectric_masking(wo.z, d.alpha) * cos_o / wo.z;
+    f_cos = share * (visible * dielectric_masking(-wi.z, d.alpha) * jacobian);
+    pdf = p * visible * jacobian;
 }
 
 struct DielectricSample {

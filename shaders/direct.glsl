@@ -13,6 +13,8 @@
 #include "medium.glsl"
 
 const bool HAS_LIGHTS = HAS_ENVIRONMENT || HAS_AREA_LIGHTS || HAS_PUNCTUAL;
+// Shadow rays meet surfaces one after the other instead of being blocked by the first.
+const bool HAS_WALKS = HAS_BLEND || HAS_PASSAGE;
 
 // A segment in a scattering medium, and where the path scattered on it.
 struct Flight {
@@ -47,66 +49,47 @@ float direct_light_weight(bool is_delta, float pdf_light, float pdf_bsdf)
     return STRATEGY == STRATEGY_BSDF_ONLY ? 0.0 : mis_weight(pdf_light, pdf_bsdf);
 }
 
-// What a surface lets straight through; the rest of the light it stops.
-vec3 direct_through(SurfacePoint s, vec3 wo, bool is_solid, Boundary boundary)
+// Light on its way from a light to a point of the path, which it reaches only straight.
+struct Shadow {
+    bool is_waiting;
+    vec3 value;      // what arrives if nothing is in the way
+    Interior interior;
+    Ray ray;
+    float lead;      // metres that the ray starts ahead of what it left
+    float t_max;
+    bool is_infinite;
+    vec3 target;
+};
+
+Shadow shadow_none()
 {
-    if (!HAS_DIELECTRIC || s.transmission <= 0.0) {
-        return vec3(1.0 - s.alpha);
-    }
-    if (is_solid && boundary.before == boundary.after) {
-        return vec3(1.0);
-    }
-    float eta = is_solid ? interior_eta(boundary) : s.ior;
-    float cosine = dot(s.ns, wo);
-    return (1.0 - s.alpha) + s.alpha * bsdf_straight(bsdf_of(s, cosine, eta), cosine);
+    return Shadow(false, vec3(0.0), interior_empty(), Ray(vec3(0.0), vec3(0.0)), 0.0, 0.0, false, vec3(0.0));
 }
 
-// Fraction of light that gets from a light to `origin`, which lies in `interior`.
-vec3 direct_visibility(Interior interior, vec3 origin, LightSample light, inout uint rays)
+// Distance left from `origin` to the light; 0 where it is reached.
+float shadow_reach(Shadow s, vec3 origin)
+{
+    return s.is_infinite ? T_FAR : max(dot(s.target - origin, s.ray.direction), 0.0);
+}
+
+Shadow shadow_of(Interior interior, vec3 origin, LightSample light, vec3 value)
 {
     vec3 to = light.target - origin;
     float t_max = light.is_infinite ? T_FAR : length(to);
-    vec3 d = light.is_infinite ? light.wi : to / t_max;
-    if (!(t_max > 0.0)) {
-        return vec3(1.0);
-    }
-    if (!HAS_BLEND && !HAS_PASSAGE) {
+    vec3 d = light.is_infinite || !(t_max > 0.0) ? light.wi : to / t_max;
+    return Shadow(true, value, interior, Ray(origin, d), 0.0, t_max, light.is_infinite, light.target);
+}
+
+// Whether all of the light arrives, where surfaces let through all or nothing.
+vec3 shadow_arrives(Shadow s, inout uint rays)
+{
+    if (s.t_max > 0.0) {
         rays++;
-        if (trace_occluded(origin, d, 0.0, t_max)) {
+        if (trace_occluded(s.ray.origin, s.ray.direction, 0.0, s.t_max)) {
             return vec3(0.0);
         }
-        return HAS_MEDIA ? medium_transmittance(scene_medium(interior.current), t_max) : vec3(1.0);
     }
-    // Surfaces that let light through are met one after the other, nearest first.
-    vec3 through = vec3(1.0);
-    float lead = 0.0; // metres that the ray starts ahead of the surface that it left
-    while (max_component(through) > 0.0) {
-        Hit hit;
-        rays++;
-        bool is_hit = trace_closest(origin, d, 0.0, t_max, hit);
-        if (HAS_MEDIA) {
-            through *= medium_transmittance(scene_medium(interior.current), max((is_hit ? hit.t : t_max) + lead, 0.0));
-        }
-        if (!is_hit) {
-            break;
-        }
-        SurfacePoint s = surface_point(hit, -d);
-        bool is_solid = HAS_DIELECTRIC && s.is_solid;
-        Boundary boundary;
-        boundary.beyond = interior;
-        if (is_solid) {
-            boundary = interior_boundary(interior, hit, s, d, rays);
-        }
-        through *= direct_through(s, -d, is_solid, boundary);
-        interior = boundary.beyond;
-        origin = offset_origin(s.position, s.error, -s.ng);
-        lead = dot(origin - s.position, d);
-        t_max = light.is_infinite ? T_FAR : dot(light.target - origin, d);
-        if (!(t_max > 0.0)) {
-            break;
-        }
-    }
-    return through;
+    return HAS_MEDIA ? s.value * medium_transmittance(scene_medium(s.interior.current), s.t_max) : s.value;
 }
 
 // Density, relative to that of the flight's own, with which the light at `point` would have drawn its distance.
@@ -127,56 +110,57 @@ float direct_found_weight(Flight flight, float pdf_phase, float pdf_light, vec3 
     return 1.0 / (1.0 + ratio * ratio * (1.0 + equiangular * equiangular));
 }
 
+// Light that may arrive, and how much if nothing is in the way.
+struct DirectLight {
+    LightSample light;
+    vec3 value;
+    vec3 at;        // where it is scattered
+};
+
 // Direct light that a point in a medium scatters back along the flight, for throughput one.
-vec3 direct_in_medium(Medium medium, Flight flight, vec3 at, Interior interior, vec4 u, inout uint rays)
+DirectLight direct_in_medium(Medium medium, Flight flight, vec4 u)
 {
-    if (!HAS_LIGHTS) {
-        return vec3(0.0);
-    }
-    LightSample light = light_sample(at, u);
-    if (!(light.pdf > 0.0)) {
-        return vec3(0.0);
-    }
-    float phase = phase_value(medium, flight.direction, light.wi);
-    float weight = direct_light_weight(light.is_delta, light.pdf, phase);
-    if (HAS_EQUIANGULAR && !light.is_infinite && weight > 0.0) {
+    DirectLight direct;
+    direct.at = flight.origin + flight.distance * flight.direction;
+    direct.light = light_sample(direct.at, u);
+    float phase = phase_value(medium, flight.direction, direct.light.wi);
+    float weight = direct_light_weight(direct.light.is_delta, direct.light.pdf, phase);
+    if (HAS_EQUIANGULAR && !direct.light.is_infinite && weight > 0.0) {
         // All three ways share: 1/w = 1/w_direction + (density by angle / density by distance)².
-        float equiangular = direct_equiangular_ratio(flight, light.target);
+        float equiangular = direct_equiangular_ratio(flight, direct.light.target);
         weight = 1.0 / (1.0 / weight + equiangular * equiangular);
     }
-    if (!(weight * phase > 0.0)) {
-        return vec3(0.0);
-    }
-    return (weight * phase / light.pdf) * light.radiance * direct_visibility(interior, at, light, rays);
+    bool is_lit = direct.light.pdf > 0.0 && weight * phase > 0.0;
+    direct.value = is_lit ? (weight * phase / direct.light.pdf) * direct.light.radiance : vec3(0.0);
+    return direct;
 }
 
 // The same for a distance that is drawn by the angle at which a light sees the segment, for throughput one at its origin.
-vec3 direct_along(Medium medium, Flight flight, Interior interior, vec4 u, float u_distance, inout uint rays)
+DirectLight direct_along(Medium medium, Flight flight, vec4 u, float u_distance)
 {
     // The same numbers choose the same point of the same light from anywhere.
-    LightSample light = light_sample(flight.origin, u);
-    if (light.is_infinite) {
-        return vec3(0.0);
+    DirectLight direct;
+    direct.light = light_sample(flight.origin, u);
+    direct.value = vec3(0.0);
+    direct.at = flight.origin;
+    if (direct.light.is_infinite) {
+        return direct;
     }
-    Equiangular e = equiangular_of(flight.origin, flight.direction, flight.end, light.target);
-    flight.distance = equiangular_sample(e, flight.end, u_distance);
-    float pdf = equiangular_pdf(e, flight.distance);
-    vec3 at = flight.origin + flight.distance * flight.direction;
-    light = light_sample(at, u);
-    if (!(pdf > 0.0) || !(light.pdf > 0.0)) {
-        return vec3(0.0);
+    Equiangular e = equiangular_of(flight.origin, flight.direction, flight.end, direct.light.target);
+    float distance = equiangular_sample(e, flight.end, u_distance);
+    float pdf = equiangular_pdf(e, distance);
+    direct.at = flight.origin + distance * flight.direction;
+    direct.light = light_sample(direct.at, u);
+    float phase = phase_value(medium, flight.direction, direct.light.wi);
+    // 1/w = 1 + (density by distance / density by angle)² / w_direction, as in direct_in_medium.
+    float weight = direct_light_weight(direct.light.is_delta, direct.light.pdf, phase);
+    if (pdf > 0.0 && direct.light.pdf > 0.0 && weight * phase > 0.0) {
+        float ratio = medium_pdf(medium, flight.channels, distance) / pdf;
+        weight = 1.0 / (1.0 + ratio * ratio / weight);
+        direct.value = (weight * phase / (pdf * direct.light.pdf)) * direct.light.radiance
+            * medium.sigma_s * medium_transmittance(medium, distance);
     }
-    float phase = phase_value(medium, flight.direction, light.wi);
-    // 1/w = (density by distance / density by angle)² · (1/w_direction) + 1, as in direct_in_medium.
-    float weight = direct_light_weight(light.is_delta, light.pdf, phase);
-    flight.pdf = medium_pdf(medium, flight.channels, flight.distance);
-    if (!(weight * phase > 0.0)) {
-        return vec3(0.0);
-    }
-    float ratio = flight.pdf / pdf;
-    weight = 1.0 / (1.0 + ratio * ratio / weight);
-    vec3 scattered = medium.sigma_s * medium_transmittance(medium, flight.distance);
-    return (weight * phase / (pdf * light.pdf)) * scattered * light.radiance * direct_visibility(interior, at, light, rays);
+    return direct;
 }
 
 #endif

@@ -147,31 +147,44 @@ Boundary interior_boundary(Interior here, Hit hit, SurfacePoint s, vec3 d, inout
     return b;
 }
 
-// The solids that hold the point: those that a ray from it leaves without having entered them.
-Interior interior_find(vec3 origin, vec3 d, inout uint rays)
+// A search for the solids that hold the camera: those that a ray from it leaves without having entered them.
+struct InteriorSearch {
+    Interior holds;
+    Interior ahead;
+    uvec2 last;        // triangle that was met last, and the one before
+    uvec2 before_last;
+};
+
+InteriorSearch interior_search()
 {
-    Interior holds = interior_empty();
-    Interior ahead = interior_empty();
-    Hit hit;
-    while (trace_closest(origin, d, 0.0, T_FAR, hit)) {
-        rays++;
-        SurfacePoint s = surface_point(hit, -d);
-        if (s.is_solid) {
-            if (!HAS_NESTED) {
-                holds.current = s.is_front ? NONE : s.material;
-                break;
-            }
-            uvec2 solid = uvec2(s.material, hit.instance);
-            bool is_ahead = interior_slot(ahead, solid) < ahead.count;
-            if (!s.is_front && !is_ahead) {
-                holds = interior_cross(holds, solid, true);
-            }
-            // What is entered at this plane, or left, together with it.
-            ahead = interior_boundary(ahead, hit, s, d, rays).beyond;
-        }
-        origin = offset_origin(s.position, s.error, -s.ng);
+    return InteriorSearch(interior_empty(), interior_empty(), uvec2(NONE), uvec2(NONE));
+}
+
+// Takes note of what the ray met at s; returns where it goes on. Ends the search by `is_found`.
+vec3 interior_note(inout InteriorSearch search, Hit hit, SurfacePoint s, out bool is_found)
+{
+    is_found = !HAS_NESTED && s.is_solid;
+    if (is_found) {
+        search.holds.current = s.is_front ? NONE : s.material;
     }
-    return holds;
+    if (!HAS_NESTED) {
+        return offset_origin(s.position, s.error, -s.ng);
+    }
+    // Faces that coincide are met one by one: the ray goes on from before the plane
+    // and skips the last triangle; once the first is met again, it goes on beyond.
+    uvec2 id = uvec2(hit.instance, hit.primitive);
+    bool is_again = id == search.before_last;
+    uvec2 solid = uvec2(s.material, hit.instance);
+    if (s.is_solid && !is_again) {
+        if (s.is_front || interior_slot(search.ahead, solid) < search.ahead.count) {
+            search.ahead = interior_cross(search.ahead, solid, s.is_front);
+        } else {
+            search.holds = interior_cross(search.holds, solid, true);
+        }
+    }
+    search.before_last = is_again ? uvec2(NONE) : search.last;
+    search.last = is_again ? uvec2(NONE) : id;
+    return offset_origin(s.position, s.error, is_again ? -s.ng : s.ng);
 }
 
 #endif

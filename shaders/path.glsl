@@ -52,8 +52,13 @@ struct PathState {
     float pdf;             // of the last scattering, per steradian
     vec3 scattered_at;
     Interior interior;
+    float camera_ior;      // index of what surrounds the camera
     float scale;           // radiance at the camera over radiance here: (n_camera / n)²
     Flight flight;         // that led to the last scattering in a medium
+    bool is_alive;
+    // With HAS_WALKS: direct light that is on its way, and more that waits for it.
+    Shadow shadow;
+    Shadow next_shadow;
 };
 
 // Sends the path from s on a ray that starts at `origin`, close to it.
@@ -81,22 +86,38 @@ bool path_survives(inout PathState path, float u)
     return true;
 }
 
-// Scattering in a medium, or its absence, over `end` metres from the point that the path left. True when the path scattered there; is_over when it ended.
-bool path_scatter(inout PathState path, inout PathResult result, uvec4 key, uint event, float end, out bool is_over)
+// Adds direct light that is scattered at `origin`, now or when its shadow ray has arrived.
+void path_light(inout PathState path, inout PathResult result, Interior interior, vec3 origin, LightSample light, vec3 value)
 {
-    is_over = false;
+    if (!(max_component(value) > 0.0)) {
+        return;
+    }
+    Shadow shadow = shadow_of(interior, origin, light, value);
+    if (!HAS_WALKS) {
+        result.radiance += shadow_arrives(shadow, result.rays);
+    } else if (path.shadow.is_waiting) {
+        path.next_shadow = shadow;
+    } else {
+        path.shadow = shadow;
+    }
+}
+
+// Scattering in a medium, or its absence, over `end` metres from the point that the path left. True when the path scattered there.
+bool path_scatter(inout PathState path, inout PathResult result, uvec4 key, uint event, float end)
+{
     Medium medium = scene_medium(path.interior.current);
     if (!HAS_SCATTERING || !medium_scatters(medium)) {
         path.beta *= medium_transmittance(medium, end);
-        is_over = max_component(path.beta) <= 0.0;
+        path.is_alive = max_component(path.beta) > 0.0;
         return false;
     }
     bool is_last = path.depth >= params.max_depth;
     vec4 u = rng_uniform(key, event, SLOT_MEDIUM);
-    Flight flight = Flight(path.ray.origin - path.lead * path.ray.direction, path.ray.direction, end, medium_channels(path.beta), 0.0, 0.0);
+    vec3 d = path.ray.direction;
+    Flight flight = Flight(path.ray.origin - path.lead * d, d, end, medium_channels(path.beta), 0.0, 0.0);
     if (HAS_EQUIANGULAR && !is_last) {
-        result.radiance += path.scale * path.beta
-            * direct_along(medium, flight, path.interior, rng_uniform(key, event, SLOT_SEGMENT), u.z, result.rays);
+        DirectLight direct = direct_along(medium, flight, rng_uniform(key, event, SLOT_SEGMENT), u.z);
+        path_light(path, result, path.interior, direct.at, direct.light, path.scale * path.beta * direct.value);
     }
     MediumSample s = medium_sample(medium, path.beta, end, u.xy);
     path.beta *= s.weight;
@@ -105,15 +126,16 @@ bool path_scatter(inout PathState path, inout PathResult result, uvec4 key, uint
     }
     if (is_last) {
         result.truncated = (path.beta.x + path.beta.y + path.beta.z) / 3.0;
-        is_over = true;
+        path.is_alive = false;
         return true;
     }
     flight.distance = s.distance;
     flight.pdf = medium_pdf(medium, flight.channels, s.distance);
-    vec3 d = path.ray.direction;
     vec3 at = flight.origin + s.distance * d;
-    result.radiance += path.scale * path.beta
-        * direct_in_medium(medium, flight, at, path.interior, rng_uniform(key, event, SLOT_LIGHT), result.rays);
+    if (HAS_LIGHTS) {
+        DirectLight direct = direct_in_medium(medium, flight, rng_uniform(key, event, SLOT_LIGHT));
+        path_light(path, result, path.interior, at, direct.light, path.scale * path.beta * direct.value);
+    }
 
     u = rng_uniform(key, event, SLOT_BSDF);
     path.ray = Ray(at, phase_sample(medium, d, u.yz));
@@ -124,7 +146,7 @@ bool path_scatter(inout PathState path, inout PathResult result, uvec4 key, uint
     path.flight = flight;
     path.depth++;
     path.chain = 0u;
-    is_over = !path_survives(path, u.w);
+    path.is_alive = path_survives(path, u.w);
     return true;
 }
 
@@ -140,6 +162,144 @@ float path_found_weight(PathState path, float pdf_light, vec3 point, bool is_inf
     return direct_bsdf_weight(path.pdf, pdf_light);
 }
 
+PathState path_start(Ray ray)
+{
+    PathState path;
+    path.ray = ray;
+    path.lead = 0.0;
+    path.beta = vec3(1.0);
+    path.depth = 0u;
+    path.chain = 0u;
+    path.can_be_sampled = false;
+    path.pdf = 0.0;
+    path.scattered_at = ray.origin;
+    path.interior = interior_empty();
+    path.camera_ior = 1.0;
+    path.scale = 1.0;
+    path.flight = flight_none();
+    path.is_alive = true;
+    path.shadow = path.next_shadow = shadow_none();
+    return path;
+}
+
+// Starts the path in the solids that hold the camera.
+void path_enter(inout PathState path, Ray camera, Interior holds)
+{
+    path.ray = camera;
+    path.interior = holds;
+    path.camera_ior = interior_ior(holds.current);
+}
+
+// A shadow ray arrived, or met s, through which the fraction `through` of the light passes.
+void path_shadow(inout PathState path, inout PathResult result, bool is_hit, SurfacePoint s, vec3 through, Interior beyond)
+{
+    bool is_done = !is_hit;
+    if (is_hit) {
+        path.shadow.value *= through;
+        vec3 origin = offset_origin(s.position, s.error, -s.ng);
+        path.shadow.ray.origin = origin;
+        path.shadow.lead = dot(origin - s.position, path.shadow.ray.direction);
+        path.shadow.t_max = shadow_reach(path.shadow, origin);
+        path.shadow.interior = beyond;
+        is_done = path.shadow.t_max == 0.0 || max_component(path.shadow.value) <= 0.0;
+    }
+    if (is_done) {
+        result.radiance += path.shadow.value;
+        path.shadow = path.next_shadow;
+        path.next_shadow.is_waiting = false;
+    }
+}
+
+// What the path does at the surface s: emission, direct light, scattering.
+void path_surface(inout PathState path, inout PathResult result, uvec4 key, uint event, SurfacePoint s, bool is_solid,
+                  Boundary boundary, mat3 frame, Bsdf bsdf)
+{
+    vec3 wo = -path.ray.direction;
+    vec3 wo_local = wo * frame;
+    vec3 far_side = offset_origin(s.position, s.error, -s.ng);
+    // A surface that covers a part of the light lets the rest pass straight on.
+    bool is_passed = HAS_BLEND && s.alpha < 1.0 && rng_uniform(key, event, SLOT_COVER).x >= s.alpha;
+    if (!is_passed) {
+        if (HAS_AOVS && path.depth == 0u) {
+            result.first = FirstHit(s.base_color, s.ns, distance(s.position, path.scattered_at), 1.0);
+        }
+        if (HAS_AREA_LIGHTS && s.emission_pdf > 0.0) {
+            vec3 to = s.position - path.scattered_at;
+            float pdf_light = path.can_be_sampled ? light_triangle_pdf(s, wo, dot(to, to)) : 0.0;
+            result.radiance += path_found_weight(path, pdf_light, s.position, false) * path.scale * path.beta * s.emission;
+        }
+        // Inside a solid that outranks it, a boundary is not there.
+        is_passed = is_solid && boundary.before == boundary.after;
+    }
+    if (is_passed) {
+        path_leave(path, s, far_side, path.ray.direction);
+        path.interior = boundary.beyond;
+        return;
+    }
+
+    bool is_last = path.depth >= params.max_depth;
+    if (is_last && !bsdf_is_straight(bsdf)) {
+        result.truncated = (path.beta.x + path.beta.y + path.beta.z) / 3.0;
+        path.is_alive = false;
+        return;
+    }
+    // Direct light. A mirror has no density that a light's sample could meet.
+    if (HAS_LIGHTS && !is_last && bsdf_has_density(bsdf)) {
+        LightSample light = light_sample(s.position, rng_uniform(key, event, SLOT_LIGHT));
+        float side = dot(light.wi, s.ng);
+        bool is_beyond = bsdf_transmits_widely(bsdf) && side < 0.0;
+        if (light.pdf > 0.0 && (side > 0.0 || is_beyond)) {
+            BsdfValue value = bsdf_eval(bsdf, wo_local, light.wi * frame);
+            float weight = direct_light_weight(light.is_delta, light.pdf, value.pdf);
+            vec3 contribution = (weight / light.pdf) * path.beta * value.f_cos * light.radiance;
+            vec3 origin = is_beyond ? far_side : offset_origin(s.position, s.error, s.ng);
+            Interior there = path.interior;
+            float scale = path.scale;
+            if (is_beyond && is_solid) {
+                there = boundary.beyond;
+                scale = square(path.camera_ior / interior_ior(boundary.after));
+            }
+            path_light(path, result, there, origin, light, scale * contribution);
+        }
+    }
+
+    vec4 u = rng_uniform(key, event, SLOT_BSDF);
+    BsdfSample next = bsdf_sample(bsdf, wo_local, u.xyz);
+    if (!next.is_valid) {
+        path.is_alive = false;
+        return;
+    }
+    path.beta *= next.weight;
+    vec3 origin = offset_origin(s.position, s.error, s.ng);
+    if (HAS_DIELECTRIC && next.is_transmitted) {
+        origin = far_side;
+        if (is_solid) {
+            path.interior = boundary.beyond;
+            path.scale = square(path.camera_ior / interior_ior(boundary.after));
+        }
+        if (next.is_straight) {
+            path_leave(path, s, origin, path.ray.direction);
+            path.is_alive = max_component(path.beta) > 0.0;
+            return;
+        }
+    }
+    if (is_last) {
+        result.truncated = (path.beta.x + path.beta.y + path.beta.z) / 3.0;
+        path.is_alive = false;
+        return;
+    }
+    path_leave(path, s, origin, normalize(frame * next.wi));
+    // A shading normal can send light to the wrong side of the surface: such samples carry nothing.
+    float side = dot(path.ray.direction, s.ng);
+    path.depth++;
+    path.chain = next.pdf > 0.0 ? 0u : path.chain + 1u;
+    path.is_alive = (next.is_transmitted ? side < 0.0 : side > 0.0) && path_survives(path, u.w);
+    path.pdf = next.pdf;
+    path.can_be_sampled = next.pdf > 0.0;
+    path.scattered_at = s.position;
+    path.flight.pdf = 0.0;
+}
+
 PathResult path_trace(uvec4 key, uvec2 pixel)
 {
     PathResult result;
@@ -148,156 +308,100 @@ PathResult path_trace(uvec4 key, uvec2 pixel)
     result.truncated = 0.0;
     result.rays = 0u;
 
-    PathState path;
-    path.ray = camera_ray(pixel, rng_uniform(key, 0u, SLOT_CAMERA).xy);
-    path.lead = 0.0;
-    path.beta = vec3(1.0);
-    path.depth = 0u;
-    path.chain = 0u;
-    path.can_be_sampled = false;
-    path.pdf = 0.0;
-    path.scattered_at = path.ray.origin;
-    path.interior = interior_empty();
-    path.scale = 1.0;
-    path.flight = flight_none();
-    float camera_ior = 1.0;
-    if (HAS_INSIDE) {
-        path.interior = interior_find(path.ray.origin, path.ray.direction, result.rays);
-        camera_ior = interior_ior(path.interior.current);
-    }
+    Ray camera = camera_ray(pixel, rng_uniform(key, 0u, SLOT_CAMERA).xy);
+    PathState path = path_start(camera);
+    bool is_search = HAS_INSIDE;
+    InteriorSearch search = interior_search();
 
-    // `event` counts everything that uses random numbers, `depth` what scatters.
-    for (uint event = 1u;; event++) {
+    // `event` counts everything that the path itself meets. One ray is traced at a time,
+    // of the path, of direct light or of the search for solids that hold the camera,
+    // so that the code that meets surfaces is there once.
+    for (uint event = 0u;;) {
+        bool is_shadow = HAS_WALKS && path.shadow.is_waiting;
+        if (!is_shadow && !path.is_alive) {
+            break;
+        }
+        Ray ray = path.ray;
+        float t_max = T_FAR;
+        float lead = path.lead;
+        if (is_shadow) {
+            ray = path.shadow.ray;
+            t_max = path.shadow.t_max;
+            lead = path.shadow.lead;
+        } else if (!is_search) {
+            event++;
+        }
+        if (HAS_INSIDE && HAS_NESTED) {
+            surface_skip = is_search ? search.last : uvec2(NONE);
+        }
         Hit hit;
-        result.rays++;
-        bool is_hit = trace_closest(path.ray.origin, path.ray.direction, 0.0, T_FAR, hit);
-        if (HAS_MEDIA) {
-            bool is_over;
-            float end = is_hit ? max(hit.t + path.lead, 0.0) : T_FAR;
-            bool is_scattered = path_scatter(path, result, key, event, end, is_over);
-            if (is_over) {
-                break;
-            }
-            if (is_scattered) {
+        bool is_hit = false;
+        if (t_max > 0.0) {
+            result.rays++;
+            is_hit = trace_closest(ray.origin, ray.direction, 0.0, t_max, hit);
+        }
+        if (HAS_MEDIA && !is_search) {
+            float end = max((is_hit ? hit.t : t_max) + lead, 0.0);
+            if (is_shadow) {
+                path.shadow.value *= medium_transmittance(scene_medium(path.shadow.interior.current), end);
+            } else if (path_scatter(path, result, key, event, end) || !path.is_alive) {
                 continue;
             }
         }
-        if (!is_hit) {
+        if (!is_hit && !is_shadow) {
+            if (is_search) {
+                is_search = false;
+                path_enter(path, camera, search.holds);
+                continue;
+            }
             float pdf_light;
-            vec3 radiance = environment_radiance(path.ray.direction, pdf_light);
+            vec3 radiance = environment_radiance(ray.direction, pdf_light);
             result.radiance += path_found_weight(path, pdf_light, vec3(0.0), true) * path.scale * path.beta * radiance;
-            break;
-        }
-        vec3 wo = -path.ray.direction;
-        SurfacePoint s = surface_point(hit, wo);
-        bool is_solid = HAS_DIELECTRIC && s.is_solid;
-        Boundary boundary;
-        boundary.beyond = path.interior;
-        if (is_solid) {
-            boundary = interior_boundary(path.interior, hit, s, path.ray.direction, result.rays);
-        }
-
-        // A surface that covers a part of the light lets the rest pass straight on.
-        if (HAS_BLEND && s.alpha < 1.0 && rng_uniform(key, event, SLOT_COVER).x >= s.alpha) {
-            path_leave(path, s, offset_origin(s.position, s.error, -s.ng), path.ray.direction);
-            path.interior = boundary.beyond;
+            path.is_alive = false;
             continue;
         }
-        if (HAS_AOVS && path.depth == 0u) {
-            result.first = FirstHit(s.base_color, s.ns, distance(s.position, path.scattered_at), 1.0);
-        }
 
-        if (HAS_AREA_LIGHTS && s.emission_pdf > 0.0) {
-            vec3 to = s.position - path.scattered_at;
-            float pdf_light = path.can_be_sampled ? light_triangle_pdf(s, wo, dot(to, to)) : 0.0;
-            result.radiance += path_found_weight(path, pdf_light, s.position, false) * path.scale * path.beta * s.emission;
-        }
-
-        float eta = s.ior;
-        if (is_solid) {
-            // Inside a solid that outranks it, a boundary is not there.
-            if (boundary.before == boundary.after) {
-                path_leave(path, s, offset_origin(s.position, s.error, -s.ng), path.ray.direction);
-                path.interior = boundary.beyond;
+        SurfacePoint s;
+        Boundary boundary;
+        boundary.beyond = is_shadow ? path.shadow.interior : path.interior;
+        bool is_solid = false;
+        mat3 frame;
+        Bsdf bsdf;
+        vec3 through = vec3(0.0);
+        if (is_hit) {
+            s = surface_point(hit, -ray.direction);
+            if (is_search) {
+                bool is_found;
+                path.ray.origin = interior_note(search, hit, s, is_found);
+                if (is_found) {
+                    is_search = false;
+                    path_enter(path, camera, search.holds);
+                }
                 continue;
             }
-            eta = interior_eta(boundary);
-        }
-        vec3 normal = s.ns;
-        if (HAS_DIELECTRIC && HAS_NORMALS && s.transmission > 0.0) {
-            normal = bsdf_interface_normal(s, wo, eta);
-        }
-        mat3 frame = frame_from_z(normal);
-        vec3 wo_local = wo * frame;
-        Bsdf bsdf = bsdf_of(s, wo_local.z, eta);
-
-        bool is_last = path.depth >= params.max_depth;
-        if (is_last && !bsdf_is_straight(bsdf)) {
-            result.truncated = (path.beta.x + path.beta.y + path.beta.z) / 3.0;
-            break;
-        }
-        // Direct light. A mirror has no density that a light's sample could meet.
-        if (HAS_LIGHTS && !is_last && bsdf_has_density(bsdf)) {
-            LightSample light = light_sample(s.position, rng_uniform(key, event, SLOT_LIGHT));
-            float side = dot(light.wi, s.ng);
-            bool is_beyond = bsdf_transmits_widely(bsdf) && side < 0.0;
-            if (light.pdf > 0.0 && (side > 0.0 || is_beyond)) {
-                BsdfValue value = bsdf_eval(bsdf, wo_local, light.wi * frame);
-                float weight = direct_light_weight(light.is_delta, light.pdf, value.pdf);
-                vec3 contribution = (weight / light.pdf) * path.beta * value.f_cos * light.radiance;
-                if (max_component(contribution) > 0.0) {
-                    vec3 origin = offset_origin(s.position, s.error, is_beyond ? -s.ng : s.ng);
-                    Interior there = path.interior;
-                    float scale = path.scale;
-                    if (is_beyond && is_solid) {
-                        there = boundary.beyond;
-                        scale = square(camera_ior / interior_ior(there.current));
-                    }
-                    result.radiance += scale * contribution * direct_visibility(there, origin, light, result.rays);
-                }
-            }
-        }
-
-        vec4 u = rng_uniform(key, event, SLOT_BSDF);
-        BsdfSample next = bsdf_sample(bsdf, wo_local, u.xyz);
-        if (!next.is_valid) {
-            break;
-        }
-        path.beta *= next.weight;
-        vec3 origin = offset_origin(s.position, s.error, s.ng);
-        if (HAS_DIELECTRIC && next.is_transmitted) {
-            origin = offset_origin(s.position, s.error, -s.ng);
+            is_solid = HAS_DIELECTRIC && s.is_solid;
+            float eta = s.ior;
             if (is_solid) {
-                path.interior = boundary.beyond;
-                path.scale = square(camera_ior / interior_ior(boundary.after));
+                boundary = interior_boundary(boundary.beyond, hit, s, ray.direction, result.rays);
+                eta = interior_eta(boundary);
             }
-            if (next.is_straight) {
-                path_leave(path, s, origin, path.ray.direction);
-                if (max_component(path.beta) <= 0.0) {
-                    break;
-                }
-                continue;
+            vec3 normal = s.ns;
+            if (HAS_DIELECTRIC && HAS_NORMALS && s.transmission > 0.0) {
+                normal = bsdf_interface_normal(s, -ray.direction, eta);
+            }
+            frame = frame_from_z(normal);
+            float cosine = -dot(ray.direction, normal);
+            bsdf = bsdf_of(s, cosine, eta);
+            if (is_shadow) {
+                bool is_passed = is_solid && boundary.before == boundary.after;
+                through = is_passed ? vec3(1.0) : 1.0 - s.alpha + s.alpha * bsdf_straight(bsdf, cosine);
             }
         }
-        if (is_last) {
-            result.truncated = (path.beta.x + path.beta.y + path.beta.z) / 3.0;
-            break;
+        if (is_shadow) {
+            path_shadow(path, result, is_hit, s, through, boundary.beyond);
+        } else {
+            path_surface(path, result, key, event, s, is_solid, boundary, frame, bsdf);
         }
-        path_leave(path, s, origin, normalize(frame * next.wi));
-        // A shading normal can send light to the wrong side of the surface: such samples carry nothing.
-        float side = dot(path.ray.direction, s.ng);
-        if (next.is_transmitted ? side >= 0.0 : side <= 0.0) {
-            break;
-        }
-        path.depth++;
-        path.chain = next.pdf > 0.0 ? 0u : path.chain + 1u;
-        if (!path_survives(path, u.w)) {
-            break;
-        }
-        path.pdf = next.pdf;
-        path.can_be_sampled = next.pdf > 0.0;
-        path.scattered_at = s.position;
-        path.flight.pdf = 0.0;
     }
     return result;
 }

@@ -26,7 +26,7 @@ const CASES: [(f32, u32, Strategy, u64, f64); 9] = [
     (0.5, 1, Strategy::BsdfOnly, 16, 1e-5),
     (0.5, 2, Strategy::BsdfOnly, 16, 1e-5),
     (0.5, 2, Strategy::Mis, 1024, 2e-3),
-    (0.5, 5, Strategy::BsdfOnly, 4096, 1e-3),
+    (0.5, 5, Strategy::BsdfOnly, 8192, 1e-3),
     (0.9, 0, Strategy::BsdfOnly, 2048, 5e-3),
     (0.9, 2, Strategy::BsdfOnly, 16, 1e-5),
     (0.9, 5, Strategy::BsdfOnly, 2048, 1e-3),
