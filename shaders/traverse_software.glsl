@@ -28,7 +28,11 @@ const float BVH_BOX_ROUNDING = 1.0 / 524288.0;
 const float BVH_MIN_DIRECTION = 8.271806125530277e-25;
 // A set bit among these: the entry is a group of nodes. Otherwise it is a group of leaf records.
 const uint BVH_NODE_BITS = 0xFF000000u;
-const uint BVH_RECORD_MASKED = 1u;
+// Fourth word of a record's third texel.
+const uint BVH_FIRST_MASKED = 1u;
+const uint BVH_SECOND_MASKED = 2u;
+const uint BVH_FIRST_TURN = 2u; // shift of two bits
+const uint BVH_SECOND_TURN = 4u;
 
 uvec4 bvh_node_texel(uint index) { return texelFetch(bvh_nodes, int(index)); }
 uvec4 bvh_triangle_texel(uint index) { return texelFetch(bvh_triangles, int(index)); }
@@ -136,22 +140,66 @@ void bvh_visit(uint index, BvhRay ray, float t_min, float t_max, out uvec2 nodes
     leaves = uvec2(links.y, hits & ~BVH_NODE_BITS);
 }
 
-// Parameter and weights of the second and third vertex; false on a miss. [Woop13] without its fall-back to double
-// precision, which only reduces the number of rays that hit both triangles of an edge.
-bool bvh_intersect(BvhRay ray, vec3 v0, vec3 v1, vec3 v2, out float t, out vec2 bary) {
-    vec3 a = bvh_shear(ray, v0);
-    vec3 b = bvh_shear(ray, v1);
-    vec3 c = bvh_shear(ray, v2);
-    precise float u = c.x * b.y - c.y * b.x;
-    precise float v = a.x * c.y - a.y * c.x;
-    precise float w = b.x * a.y - b.y * a.x;
-    float sum = u + v + w;
-    bary = vec2(v, w) / sum;
+float bvh_cross(vec3 a, vec3 b) {
+    precise float product = a.x * b.y - a.y * b.x;
+    return product;
+}
+
+// Whether the edge functions have one sign; zero is both. Comparisons, as in bvh_four_hits.
+bool bvh_inside(vec3 edges) {
+    precise float least = edges.x < edges.y ? edges.x : edges.y;
+    least = edges.z < least ? edges.z : least;
+    precise float most = edges.x > edges.y ? edges.x : edges.y;
+    most = edges.z > most ? edges.z : most;
+    return least >= 0.0 || most <= 0.0;
+}
+
+// Edge functions of a triangle of a record as weights of the second and third vertex of the scene's triangle, which
+// the record holds turned.
+vec2 bvh_weights(vec3 edges, float sum, uint turn) {
+    vec2 weights = turn == 0u ? edges.yz : turn == 1u ? edges.xy : edges.zx;
+    return weights / sum;
+}
+
+// Meets a record's triangles, v0 v1 v2 and v0 v2 v3, and takes a hit that is nearer. [Woop13] without its fall-back
+// to double precision, which only reduces the number of rays that hit both triangles of an edge.
+bool bvh_intersect(BvhRay ray, uint record, uvec4 v0, uint instance, float t_min, inout Hit hit) {
+    uvec4 v1 = bvh_triangle_texel(record + 1u);
+    uvec4 v2 = bvh_triangle_texel(record + 2u);
+    uvec4 v3 = bvh_triangle_texel(record + 3u);
+    vec3 a = bvh_shear(ray, uintBitsToFloat(v0.xyz));
+    vec3 b = bvh_shear(ray, uintBitsToFloat(v1.xyz));
+    vec3 c = bvh_shear(ray, uintBitsToFloat(v2.xyz));
+    vec3 d = bvh_shear(ray, uintBitsToFloat(v3.xyz));
+    vec3 first = vec3(bvh_cross(c, b), bvh_cross(a, c), bvh_cross(b, a));
+    // The common edge runs the other way, which negates its function exactly.
+    vec3 second = vec3(bvh_cross(d, c), bvh_cross(a, d), -first.y);
+    float first_sum = first.x + first.y + first.z;
+    float second_sum = second.x + second.y + second.z;
     // A mean of the vertices' depths: never beyond the triangle, even where it is seen edge-on.
-    t = a.z + bary.x * (b.z - a.z) + bary.y * (c.z - a.z);
-    float least = min(u, min(v, w));
-    float most = max(u, max(v, w));
-    return (least >= 0.0 || most <= 0.0) && sum != 0.0;
+    float first_t = a.z + (first.y * (b.z - a.z) + first.z * (c.z - a.z)) / first_sum;
+    float second_t = a.z + (second.y * (c.z - a.z) + second.z * (d.z - a.z)) / second_sum;
+    // Where there is no second triangle v3 equals v0, which makes its sum 0.
+    bool meets_first = bvh_inside(first) && first_sum != 0.0 && first_t > t_min && first_t < hit.t;
+    bool meets_second = bvh_inside(second) && second_sum != 0.0 && second_t > t_min && second_t < hit.t;
+    if (HAS_ALPHA) {
+        if (meets_first && (v2.w & BVH_FIRST_MASKED) != 0u) {
+            vec2 bary = bvh_weights(first, first_sum, v2.w >> BVH_FIRST_TURN & 3u);
+            meets_first = surface_is_opaque(instance, v0.w, bary);
+        }
+        if (meets_second && (v2.w & BVH_SECOND_MASKED) != 0u) {
+            vec2 bary = bvh_weights(second, second_sum, v2.w >> BVH_SECOND_TURN & 3u);
+            meets_second = surface_is_opaque(instance, v1.w, bary);
+        }
+    }
+    if (!meets_first && !meets_second) {
+        return false;
+    }
+    bool is_second = meets_second && !(meets_first && first_t <= second_t);
+    uint turn = v2.w >> (is_second ? BVH_SECOND_TURN : BVH_FIRST_TURN) & 3u;
+    vec2 bary = bvh_weights(is_second ? second : first, is_second ? second_sum : first_sum, turn);
+    hit = Hit(is_second ? second_t : first_t, bary, instance, is_second ? v1.w : v0.w);
+    return true;
 }
 
 // The stack of groups that wait, its two newest entries in registers. On
@@ -221,9 +269,9 @@ bool bvh_trace(vec3 origin, vec3 dir, float t_min, float t_max, bool any_hit, ou
                 bvh_visit(index, ray, t_min, hit.t, nodes, leaves);
             }
         }
-        // Two records at most before the next node: lanes that have more wait less for those that have none.
-        for (uint i = 0u; i < 2u && leaves.y != 0u; i++) {
-            uint record = 3u * (leaves.x + uint(findLSB(leaves.y)));
+        // One record before the next node: lanes that have more wait less for those that have none.
+        if (leaves.y != 0u) {
+            uint record = 4u * (leaves.x + uint(findLSB(leaves.y)));
             leaves.y &= leaves.y - 1u;
             uvec4 v0 = bvh_triangle_texel(record);
             if (HAS_INSTANCES && instance == NONE) {
@@ -239,26 +287,13 @@ bool bvh_trace(vec3 origin, vec3 dir, float t_min, float t_max, bool any_hit, ou
                 vec3 z = instances[instance].object_from_world_z;
                 vec3 moved = x * origin.x + y * origin.y + z * origin.z + instances[instance].object_from_world_t;
                 ray = bvh_ray(moved, x * dir.x + y * dir.y + z * dir.z);
-                break;
-            }
-            uvec4 v1 = bvh_triangle_texel(record + 1u);
-            uvec4 v2 = bvh_triangle_texel(record + 2u);
-            float t;
-            vec2 bary;
-            if (bvh_intersect(ray, uintBitsToFloat(v0.xyz), uintBitsToFloat(v1.xyz), uintBitsToFloat(v2.xyz), t, bary) && t > t_min && t < hit.t) {
-                uint primitive = v0.w;
-                bool is_masked = HAS_ALPHA && (v1.w & BVH_RECORD_MASKED) != 0u;
-                if (!is_masked || surface_is_opaque(instance, primitive, bary)) {
-                    hit = Hit(t, bary, instance, primitive);
-                    if (any_hit) {
-                        // Nothing left to do: the loop ends by itself.
-                        nodes.y = 0u;
-                        leaves.y = 0u;
-                        bvh_height = 0u;
-                        bvh_newest = uvec2(0u);
-                        bvh_older = uvec2(0u);
-                    }
-                }
+            } else if (bvh_intersect(ray, record, v0, instance, t_min, hit) && any_hit) {
+                // Nothing left to do: the loop ends by itself.
+                nodes.y = 0u;
+                leaves.y = 0u;
+                bvh_height = 0u;
+                bvh_newest = uvec2(0u);
+                bvh_older = uvec2(0u);
             }
         }
     }

@@ -7,10 +7,11 @@ use std::path::PathBuf;
 use glam::{DVec3, Vec3};
 use obvhs::aabb::Aabb;
 
+use super::pairs::pair;
 use super::topology::{Effort, Slot, Topology};
 use super::{
     Bvh, GroupDesc, GroupRange, InstanceDesc, MAX_COORDINATE, MAX_GROUP_LEVELS, MAX_TOP_LEVELS,
-    Node, Quality, RECORD_MASKED, Record, child, child_box,
+    Node, Quality, Record, child, child_box,
 };
 use crate::error::{Error, Result};
 
@@ -57,7 +58,7 @@ impl Bvh {
             bvh.nodes.push([0; 20]);
         }
         if bvh.triangles.is_empty() {
-            bvh.triangles.push([0.0; 12]);
+            bvh.triangles.push([0.0; 16]);
         }
         Ok(bvh)
     }
@@ -77,19 +78,18 @@ impl Bvh {
             .enumerate()
             .map(|(index, corners)| triangle_box(corners, index))
             .collect::<Result<Vec<_>>>()?;
+        let pairs = pair(corners, &boxes);
+        let boxes: Vec<_> = pairs.iter().map(|pair| pair.bounds(&boxes)).collect();
         let topology = Topology::build(&boxes, Effort::Group(quality), MAX_GROUP_LEVELS);
-        let first_triangle = self.triangles.len() as u32;
+        let first_record = self.triangles.len() as u32;
         let root = self.push_nodes(&topology, &boxes)?;
-        self.triangles.extend(topology.order.iter().map(|&index| {
-            let [a, b, c] = corners[index as usize];
-            let masked = group.masked.get(index as usize).copied().unwrap_or(false);
-            let flags = if masked { RECORD_MASKED } else { 0 };
-            let (id, flags) = (f32::from_bits(index), f32::from_bits(flags));
-            [a.x, a.y, a.z, id, b.x, b.y, b.z, flags, c.x, c.y, c.z, 0.0]
-        }));
+        let records = topology.order.iter();
+        self.triangles
+            .extend(records.map(|&index| pairs[index as usize].record(corners, group.masked)));
         self.groups.push(GroupRange {
             root,
-            first_triangle,
+            first_record,
+            record_count: pairs.len() as u32,
             triangle_count: corners.len() as u32,
         });
         Ok(())
@@ -108,7 +108,7 @@ impl Bvh {
         let topology = Topology::build(&boxes, Effort::TopLevel, MAX_TOP_LEVELS);
         self.root = self.push_nodes(&topology, &boxes)?;
         self.triangles.extend(topology.order.iter().map(|&index| {
-            let mut record: Record = [0.0; 12];
+            let mut record: Record = [0.0; 16];
             record[3] = f32::from_bits(index);
             record
         }));
@@ -123,7 +123,7 @@ impl Bvh {
             (
                 "the BVH's triangles",
                 first_record + topology.order.len(),
-                3,
+                4,
             ),
         ] {
             let texels = count as u64 * texels;

@@ -25,11 +25,15 @@
 //! Bytes are counted from the low end of a word. The box of a slot is
 //! `[p + e·lower, p + e·upper]` and contains, in exact arithmetic, everything below it.
 //!
-//! # Record, twelve words (48 bytes, three texels)
+//! # Record, sixteen words (64 bytes, four texels)
 //!
-//! A triangle: `v0.xyz`, index within the group; `v1.xyz`, [`RECORD_MASKED`] or 0;
-//! `v2.xyz`, 0. A leaf entry of the top level: three words unused, index of the
-//! instance, the rest unused. Integers are stored as the bits of a float.
+//! One triangle `v0 v1 v2`, or two with a common edge, `v0 v1 v2` and `v0 v2 v3`: two in a
+//! record take four texel fetches instead of six, and their common edge is tested once.
+//! `v0.xyz`, index of the first triangle within the group; `v1.xyz`, index of the second or
+//! [`NO_TRIANGLE`]; `v2.xyz`, flags: [`FIRST_MASKED`], [`SECOND_MASKED`] and two bits each from
+//! [`FIRST_TURN`] and [`SECOND_TURN`], which say which corner of the triangle as it was given is
+//! `v0`; `v3.xyz`, equal to `v0` when there is no second triangle, 0. A leaf entry of the top level:
+//! three words unused, index of the instance, the rest unused. Integers are stored as the bits of a float.
 //!
 //! All indices count from the start of the arrays, so a root is all that traversal needs.
 //!
@@ -39,6 +43,7 @@
 //! through compressed wide BVHs. High-Performance Graphics 2017.
 
 mod build;
+mod pairs;
 #[cfg(test)]
 mod tests;
 mod topology;
@@ -51,11 +56,19 @@ use glam::Vec3;
 
 /// A packed node.
 pub type Node = [u32; 20];
-/// A packed triangle or leaf entry of the top level.
-pub type Record = [f32; 12];
+/// One or two packed triangles or a leaf entry of the top level.
+pub type Record = [f32; 16];
 
-/// Flag of a record whose triangle may be cut out: hits are confirmed by the alpha test.
-pub const RECORD_MASKED: u32 = 1;
+/// Flag of a record whose first triangle may be cut out: hits are confirmed by the alpha test.
+pub const FIRST_MASKED: u32 = 1;
+/// The same for the second triangle.
+pub const SECOND_MASKED: u32 = 2;
+/// Position of the bits that hold how far the first triangle is turned.
+pub const FIRST_TURN: u32 = 2;
+/// The same for the second triangle.
+pub const SECOND_TURN: u32 = 4;
+/// Stands for a second triangle that is not there; not a NaN, so that records compare.
+pub const NO_TRIANGLE: u32 = f32::MAX.to_bits();
 /// Levels of nodes that a top level may have.
 pub const MAX_TOP_LEVELS: u32 = 10;
 /// Levels of nodes that a group may have.
@@ -119,8 +132,10 @@ pub struct GroupRange {
     /// Its root in [`Bvh::nodes`].
     pub root: u32,
     /// Its first record in [`Bvh::triangles`].
-    pub first_triangle: u32,
+    pub first_record: u32,
     /// Number of its records.
+    pub record_count: u32,
+    /// Number of its triangles.
     pub triangle_count: u32,
 }
 
@@ -208,9 +223,43 @@ fn child_box(node: &Node, slot: usize) -> ([f64; 3], [f64; 3]) {
     )
 }
 
-/// Corner `corner` (0–2) of a triangle record.
+/// Vertex `corner` (0–3) of a record.
 fn vertex(record: &Record, corner: usize) -> Vec3 {
     Vec3::from_slice(&record[4 * corner..4 * corner + 3])
+}
+
+/// A triangle of a record.
+struct Member {
+    /// Index within the group.
+    id: u32,
+    /// Which vertices of the record are its corners.
+    corners: [usize; 3],
+    is_masked: bool,
+    /// Which of its corners, as it was given, comes first in the record.
+    turn: usize,
+}
+
+impl Member {
+    /// Something for each corner in the record's order, as the triangle was given.
+    fn given<T: Copy>(&self, of_corners: [T; 3]) -> [T; 3] {
+        [0, 1, 2].map(|corner| of_corners[(corner + 3 - self.turn) % 3])
+    }
+}
+
+/// The one or two triangles of a record.
+fn members(record: &Record) -> impl Iterator<Item = Member> {
+    let flags = record[11].to_bits();
+    let member = |id: u32, corners, mask, turn| Member {
+        id,
+        corners,
+        is_masked: flags & mask != 0,
+        turn: (flags >> turn & 3) as usize,
+    };
+    let first = member(record[3].to_bits(), [0, 1, 2], FIRST_MASKED, FIRST_TURN);
+    let second = member(record[7].to_bits(), [0, 2, 3], SECOND_MASKED, SECOND_TURN);
+    [first, second]
+        .into_iter()
+        .filter(|member| member.id != NO_TRIANGLE)
 }
 
 /// A point moved by a 4 × 3 matrix, in the shader's order of operations.

@@ -10,7 +10,7 @@
 use glam::{DVec3, Vec3};
 
 use super::{
-    Bvh, InstanceDesc, Node, RECORD_MASKED, Record, STACK_SIZE, byte, grid, transform_point,
+    Bvh, InstanceDesc, Member, Node, Record, STACK_SIZE, byte, grid, members, transform_point,
     transform_vector, vertex,
 };
 
@@ -157,11 +157,11 @@ fn node_hits(node: &Node, ray: &Prepared, t_min: f32, t_max: f32) -> u32 {
     hits
 }
 
-/// Parameter and weights of the second and third vertex. \[Woop13\] without its fall-back to double precision: a
-/// product that is rounded once keeps the sign of each edge's function right or makes it zero, in both of the
-/// triangles that share the edge, and zero counts as inside.
-fn intersect(record: &Record, ray: &Prepared) -> Option<(f32, [f32; 2])> {
-    let [a, b, c] = [0, 1, 2].map(|corner| {
+/// Parameter and weights of the second and third vertex, as the triangle was given. \[Woop13\] without its fall-back
+/// to double precision: a product that is rounded once keeps the sign of each edge's function right or makes it zero,
+/// in both of the triangles that share the edge, and zero counts as inside.
+fn intersect(record: &Record, member: &Member, ray: &Prepared) -> Option<(f32, [f32; 2])> {
+    let [a, b, c] = member.corners.map(|corner| {
         let v = vertex(record, corner) - ray.origin;
         let row = |r: Vec3| v.x * r.x + v.y * r.y + v.z * r.z;
         Vec3::new(row(ray.shear[0]), row(ray.shear[1]), row(ray.shear[2]))
@@ -174,8 +174,9 @@ fn intersect(record: &Record, ray: &Prepared) -> Option<(f32, [f32; 2])> {
     if outside || sum == 0.0 {
         return None;
     }
-    let (v, w) = (v / sum, w / sum);
-    Some((a.z + v * (b.z - a.z) + w * (c.z - a.z), [v, w]))
+    let t = a.z + (v * (b.z - a.z) + w * (c.z - a.z)) / sum;
+    let [_, v, w] = member.given([u, v, w]);
+    Some((t, [v / sum, w / sum]))
 }
 
 /// Both traversals; `any` ends at the first hit.
@@ -225,8 +226,8 @@ fn walk(bvh: &Bvh, world: &Ray, is_opaque: IsOpaque, any: bool) -> Option<Hit> {
         }
         let record = &bvh.triangles[(leaves.0 + leaves.1.trailing_zeros()) as usize];
         leaves.1 &= leaves.1 - 1;
-        let id = record[3].to_bits();
         let Some(instance_id) = instance else {
+            let id = record[3].to_bits();
             // A leaf entry of the top level: leave what remains for later and enter the group.
             if nodes.1 & NODE_BITS != 0 {
                 stack[height] = nodes;
@@ -246,23 +247,28 @@ fn walk(bvh: &Bvh, world: &Ray, is_opaque: IsOpaque, any: bool) -> Option<Hit> {
             );
             continue;
         };
-        let Some((t, bary)) = intersect(record, &ray) else {
-            continue;
-        };
-        let masked = record[7].to_bits() & RECORD_MASKED != 0;
-        if t > world.t_min
-            && t < best.map_or(world.t_max, |hit| hit.t)
-            && (!masked || is_opaque(instance_id, id, bary))
-        {
-            best = Some(Hit {
-                t,
-                bary,
-                instance: instance_id,
-                primitive: id,
-            });
-            if any {
-                return best;
+        let t_max = best.map_or(world.t_max, |hit| hit.t);
+        let mut nearest: Option<Hit> = None;
+        for member in members(record) {
+            let Some((t, bary)) = intersect(record, &member, &ray) else {
+                continue;
+            };
+            if t > world.t_min
+                && t < t_max
+                && (!member.is_masked || is_opaque(instance_id, member.id, bary))
+                && nearest.is_none_or(|hit| t < hit.t)
+            {
+                nearest = Some(Hit {
+                    t,
+                    bary,
+                    instance: instance_id,
+                    primitive: member.id,
+                });
             }
+        }
+        best = nearest.or(best);
+        if any && best.is_some() {
+            return best;
         }
     }
 }
@@ -287,16 +293,17 @@ pub fn closest_exhaustive(bvh: &Bvh, ray: &Ray, is_opaque: IsOpaque) -> (Option<
         let linear = |v: DVec3| m[0] * v.x + m[1] * v.y + m[2] * v.z;
         let origin = linear(ray.origin.as_dvec3()) + m[3];
         let direction = linear(ray.direction.as_dvec3());
-        let records =
-            &bvh.triangles[group.first_triangle as usize..][..group.triangle_count as usize];
-        for record in records {
-            let Some((t, bary)) = intersect_double(record, origin, direction) else {
+        let records = &bvh.triangles[group.first_record as usize..][..group.record_count as usize];
+        let triangles = records
+            .iter()
+            .flat_map(|record| members(record).map(move |member| (record, member)));
+        for (record, member) in triangles {
+            let Some((t, bary)) = intersect_double(record, &member, origin, direction) else {
                 continue;
             };
-            let (instance, primitive) = (instance as u32, record[3].to_bits());
-            let masked = record[7].to_bits() & RECORD_MASKED != 0;
+            let (instance, primitive) = (instance as u32, member.id);
             if !(t > f64::from(ray.t_min) && t < f64::from(ray.t_max))
-                || masked && !is_opaque(instance, primitive, bary)
+                || member.is_masked && !is_opaque(instance, primitive, bary)
             {
                 continue;
             }
@@ -317,8 +324,16 @@ pub fn closest_exhaustive(bvh: &Bvh, ray: &Ray, is_opaque: IsOpaque) -> (Option<
 }
 
 /// Möller and Trumbore in double precision.
-fn intersect_double(record: &Record, origin: DVec3, direction: DVec3) -> Option<(f64, [f32; 2])> {
-    let [a, b, c] = [0, 1, 2].map(|corner| vertex(record, corner).as_dvec3());
+fn intersect_double(
+    record: &Record,
+    member: &Member,
+    origin: DVec3,
+    direction: DVec3,
+) -> Option<(f64, [f32; 2])> {
+    let corners = member
+        .corners
+        .map(|corner| vertex(record, corner).as_dvec3());
+    let [a, b, c] = member.given(corners);
     let (ab, ac) = (b - a, c - a);
     let across = direction.cross(ac);
     let det = ab.dot(across);

@@ -1,9 +1,12 @@
 //! The tree checks itself.
 
 use super::{
-    Bvh, Child, MAX_GROUP_LEVELS, MAX_TOP_LEVELS, Node, RECORD_MASKED, Record, child, child_box,
-    vertex,
+    Bvh, Child, FIRST_MASKED, FIRST_TURN, MAX_GROUP_LEVELS, MAX_TOP_LEVELS, Node, Record,
+    SECOND_MASKED, SECOND_TURN, child, child_box, members, vertex,
 };
+
+/// What the flags of a record may be.
+const KNOWN_FLAGS: u32 = FIRST_MASKED | SECOND_MASKED | 3 << FIRST_TURN | 3 << SECOND_TURN;
 
 /// Bounds in double precision: low, high.
 type Bounds = ([f64; 3], [f64; 3]);
@@ -13,6 +16,10 @@ struct Tree<'a> {
     bvh: &'a Bvh,
     /// Its part of [`Bvh::triangles`].
     records: std::ops::Range<usize>,
+    /// Number of the things that the records stand for.
+    ids: usize,
+    /// Which of them a record stands for.
+    named: fn(&Record) -> Vec<u32>,
     /// Levels allowed.
     max_levels: u32,
     /// Bounds of a record; `None` where they are not known (instances).
@@ -28,26 +35,30 @@ impl Bvh {
     pub fn validate(&self) -> Result<(), String> {
         let mut visited = vec![false; self.nodes.len()];
         for (index, group) in self.groups.iter().enumerate() {
-            let first = group.first_triangle as usize;
+            let first = group.first_record as usize;
             let tree = Tree {
                 bvh: self,
-                records: first..first + group.triangle_count as usize,
+                records: first..first + group.record_count as usize,
+                ids: group.triangle_count as usize,
+                named: |record| members(record).map(|member| member.id).collect(),
                 max_levels: MAX_GROUP_LEVELS,
-                bounds: |record| Some(triangle_bounds(record)),
+                bounds: |record| Some(record_bounds(record)),
             };
             tree.check(group.root, &mut visited)
                 .map_err(|what| format!("group {index}: {what}"))?;
             for record in &self.triangles[tree.records.clone()] {
-                if record[7].to_bits() & !RECORD_MASKED != 0 {
+                if record[11].to_bits() & !KNOWN_FLAGS != 0 {
                     return Err(format!("group {index}: unknown flags"));
                 }
             }
         }
         if !self.instances.is_empty() {
-            let first = self.groups.iter().map(|g| g.triangle_count as usize).sum();
+            let first = self.groups.iter().map(|g| g.record_count as usize).sum();
             let tree = Tree {
                 bvh: self,
                 records: first..first + self.instances.len(),
+                ids: self.instances.len(),
+                named: |record| vec![record[3].to_bits()],
                 max_levels: MAX_TOP_LEVELS,
                 bounds: |_| None,
             };
@@ -71,15 +82,19 @@ impl Tree<'_> {
         if let Some(lost) = referenced.iter().position(|&referenced| !referenced) {
             return Err(format!("record {lost} is in no leaf"));
         }
-        let mut named = vec![false; self.records.len()];
+        let mut named = vec![false; self.ids];
         for record in &self.bvh.triangles[self.records.clone()] {
-            let id = record[3].to_bits();
-            match named.get_mut(id as usize) {
-                Some(named) if !*named => *named = true,
-                _ => return Err(format!("id {id} is out of range or occurs twice")),
+            for id in (self.named)(record) {
+                match named.get_mut(id as usize) {
+                    Some(named) if !*named => *named = true,
+                    _ => return Err(format!("id {id} is out of range or occurs twice")),
+                }
             }
         }
-        Ok(())
+        match named.iter().position(|&named| !named) {
+            Some(id) => Err(format!("id {id} is in no record")),
+            None => Ok(()),
+        }
     }
 
     /// Checks what is below a node and returns its exact bounds.
@@ -142,9 +157,10 @@ impl Tree<'_> {
     }
 }
 
-fn triangle_bounds(record: &Record) -> Bounds {
-    let [a, b, c] = [0, 1, 2].map(|corner| vertex(record, corner).as_dvec3());
-    (a.min(b).min(c).to_array(), a.max(b).max(c).to_array())
+fn record_bounds(record: &Record) -> Bounds {
+    let [a, b, c, d] = [0, 1, 2, 3].map(|corner| vertex(record, corner).as_dvec3());
+    let (low, high) = (a.min(b).min(c).min(d), a.max(b).max(c).max(d));
+    (low.to_array(), high.to_array())
 }
 
 fn union(all: Option<Bounds>, one: Bounds) -> Bounds {

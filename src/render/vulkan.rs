@@ -109,7 +109,7 @@ impl VulkanBackend {
                 params.bvh_root = bvh.root;
                 for (record, placement) in instances.iter_mut().zip(&data.geometry.placements) {
                     record.bvh_root = bvh.groups[placement.group].root;
-                    record.bvh_first_triangle = bvh.groups[placement.group].first_triangle;
+                    record.bvh_first_triangle = bvh.groups[placement.group].first_record;
                 }
                 upload_bvh(device, &bvh)?
             }
