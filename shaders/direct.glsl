@@ -13,8 +13,6 @@
 #include "medium.glsl"
 
 const bool HAS_LIGHTS = HAS_ENVIRONMENT || HAS_AREA_LIGHTS || HAS_PUNCTUAL;
-// Shadow rays meet surfaces one after the other instead of being blocked by the first.
-const bool HAS_WALKS = HAS_BLEND || HAS_PASSAGE;
 
 // A segment in a scattering medium, and where the path scattered on it.
 struct Flight {

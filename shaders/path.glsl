@@ -56,7 +56,7 @@ struct PathState {
     float scale;           // radiance at the camera over radiance here: (n_camera / n)²
     Flight flight;         // that led to the last scattering in a medium
     bool is_alive;
-    // With HAS_WALKS: direct light that is on its way, and more that waits for it.
+    // With HAS_PASSAGE: direct light that is on its way, and more that waits for it.
     Shadow shadow;
     Shadow next_shadow;
 };
@@ -93,7 +93,7 @@ void path_light(inout PathState path, inout PathResult result, Interior interior
         return;
     }
     Shadow shadow = shadow_of(interior, origin, light, value);
-    if (!HAS_WALKS) {
+    if (!HAS_PASSAGE) {
         result.radiance += shadow_arrives(shadow, result.rays);
     } else if (path.shadow.is_waiting) {
         path.next_shadow = shadow;
@@ -317,7 +317,7 @@ PathResult path_trace(uvec4 key, uvec2 pixel)
     // of the path, of direct light or of the search for solids that hold the camera,
     // so that the code that meets surfaces is there once.
     for (uint event = 0u;;) {
-        bool is_shadow = HAS_WALKS && path.shadow.is_waiting;
+        bool is_shadow = HAS_PASSAGE && path.shadow.is_waiting;
         if (!is_shadow && !path.is_alive) {
             break;
         }

@@ -16,7 +16,7 @@ layout(constant_id = 8) const bool HAS_PUNCTUAL = true;    // point, spot, direc
 layout(constant_id = 9) const bool HAS_INSTANCES = true;   // groups that are not in world space
 layout(constant_id = 10) const bool HAS_AOVS = true;
 layout(constant_id = 11) const bool HAS_DIELECTRIC = true; // any material that transmits
-layout(constant_id = 12) const bool HAS_PASSAGE = true;    // shadow rays may go through smooth sheets or boundaries
+layout(constant_id = 12) const bool HAS_PASSAGE = true;    // shadow rays go through surfaces that let light straight through
 layout(constant_id = 13) const bool HAS_NESTED = true;     // solids that may overlap or touch
 layout(constant_id = 14) const bool HAS_INSIDE = true;     // the camera may be inside a solid
 layout(constant_id = 15) const bool HAS_MEDIA = true;      // anything that absorbs or scatters

@@ -32,7 +32,7 @@ pub struct Spec {
     pub aovs: bool,
     /// Any material that transmits.
     pub dielectric: bool,
-    /// Shadow rays may go through smooth sheets or boundaries.
+    /// Shadow rays go through surfaces that let light straight through: partial coverage, smooth sheets, matched boundaries.
     pub passage: bool,
     /// Solids that may overlap or touch.
     pub nested: bool,
@@ -77,7 +77,7 @@ impl Spec {
             spec.specular |= is_specular(material);
             spec.area_lights |= is_emissive(material);
             spec.dielectric |= is_transmissive(material);
-            spec.passage |= is_transmissive(material) && may_pass(material);
+            spec.passage |= spec.blend || (is_transmissive(material) && may_pass(material));
             let inside = material.volume.as_ref().map(|v| &v.medium);
             spec.media |= inside.is_some_and(|m| !m.is_clear());
             spec.scattering |= inside.is_some_and(|m| m.scattering != glam::Vec3::ZERO);

@@ -18,5 +18,6 @@ layout(binding = 5, scalar) buffer Probe05 { Light lights[]; };
 layout(binding = 6, scalar) buffer Probe06 { EnvTexel env_texels[]; };
 layout(binding = 7, scalar) buffer Probe07 { ProbeRay probe_rays[]; };
 layout(binding = 8, scalar) buffer Probe08 { ProbeHit probe_hits[]; };
+layout(binding = 9, scalar) buffer Probe09 { Medium media[]; };
 
 void main() {}

@@ -9,6 +9,7 @@ const HEADER_WORDS: usize = 5;
 
 const OP_NAME: u32 = 5;
 const OP_MEMBER_NAME: u32 = 6;
+const OP_EXT_INST: u32 = 12;
 const OP_TYPE_RUNTIME_ARRAY: u32 = 29;
 const OP_FUNCTION: u32 = 54;
 const OP_LOAD: u32 = 61;
@@ -130,6 +131,13 @@ impl Module {
             .collect();
         bindings.sort_unstable();
         bindings
+    }
+
+    /// Uses of an instruction of GLSL.std.450, the only extended set there is.
+    pub fn extended(&self, instruction: u32) -> usize {
+        self.all(OP_EXT_INST)
+            .filter(|o| o[3] == instruction)
+            .count()
     }
 
     /// Instructions from the first function on.

@@ -74,3 +74,39 @@ fn camera_in_a_glass_cube_sees_n_squared_or_nothing() {
         );
     }
 }
+
+/// Neither the size of the cube nor its place changes what is seen from inside.
+#[test]
+fn glass_cube_may_have_any_size_and_place() {
+    for (scale, offset) in [(1e-6, 0.0), (1e6, 0.0), (1.0, 1e6)] {
+        let mut scene = empty();
+        let half = Vec3::splat(1.0);
+        add(
+            &mut scene,
+            block(-half, half),
+            glass(1.5, Medium::default()),
+        );
+        scene.environment = constant_sky(1.0);
+        // Within the cone of light that gets out: every pixel is n².
+        let from = DVec3::new(0.1, 0.2, 0.3);
+        scene.cameras = vec![pinhole(from, from + DVec3::Z, 40.0)];
+        let scene = carried(scene, scale, DVec3::new(offset, -offset, offset));
+        for backend in BOTH {
+            let settings = Settings {
+                backend,
+                ..settings(16, 16)
+            };
+            let Some(r) = render(&scene, &settings, Tuning::default()) else {
+                return;
+            };
+            for p in r.film.mean() {
+                let off = (f64::from(p[0]) / 2.25 - 1.0).abs();
+                assert!(
+                    off < 1e-5,
+                    "{backend:?}, × {scale}, + {offset}: pixel {}",
+                    p[0]
+                );
+            }
+        }
+    }
+}

@@ -15,6 +15,7 @@ mod common;
 mod closed;
 mod cube;
 mod fog;
+mod gradient;
 mod nested;
 mod slab;
 

@@ -87,7 +87,7 @@ fn liquid_between_panes_does_not_depend_on_the_overlap() {
                 scene.cameras = vec![oblique(degrees, 0.1)];
                 let settings = Settings {
                     backend,
-                    ..settings(16, 2048)
+                    ..settings(16, 4096)
                 };
                 let what = format!("{backend:?}, {degrees}°, overlap {overlap}");
                 assert_transmits(&what, &scene, &settings, truth);
