@@ -73,6 +73,10 @@ impl Record<'_> {
         // per path: what they would have added if unit radiance had met each of them
         let throughput = ledger.truncated_throughput / self.report.paths.max(1) as f64;
         put("ledger.truncated_throughput", throughput.into());
+        put(
+            "ledger.interior_overflows",
+            count(ledger.interior_overflows),
+        );
         // a limit that looks at the samples favours images that look finished early
         put("ledger.stop", self.stop_text().into());
         self.put_settings(&mut data);

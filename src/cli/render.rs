@@ -285,6 +285,12 @@ fn warn_about(record: &Record, reporter: &Reporter) {
             ledger.non_finite
         ));
     }
+    if ledger.interior_overflows > 0 {
+        reporter.warn(&format!(
+            "more solids overlap at a point than are tracked; {} of their boundaries were missed",
+            ledger.interior_overflows
+        ));
+    }
     let args = record.args;
     let by_default = args.spp.is_none() && args.samples.is_none();
     if record.stop == Stop::Samples && by_default && (args.time.is_some() || args.noise.is_some()) {

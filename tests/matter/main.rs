@@ -16,7 +16,9 @@ mod closed;
 mod cube;
 mod fog;
 mod gradient;
+mod lamps;
 mod nested;
+mod scatter;
 mod slab;
 
 use common::*;
