@@ -4,7 +4,7 @@ import math
 
 from .gltf import Gltf
 from .images import png, srgb
-from .shapes import basin, cuboid, icosphere, lathe, quad, rectangle, solid_cuboid
+from .shapes import basin, cuboid, icosphere, lathe, rectangle, solid_cuboid
 from .vector import axis_angle
 
 NEAREST, REPEAT = 9728, 10497
@@ -28,12 +28,10 @@ def tiled(shape, columns, rows):
     return shape
 
 
-def lamp(gltf, center, half, radiance):
-    """A square that shines down."""
-    x, y, z = center
-    corners = [(x - half, y, z - half), (x + half, y, z - half), (x + half, y, z + half), (x - half, y, z + half)]
-    glow = gltf.emitter("lamp", radiance)
-    gltf.node("lamp", mesh=gltf.mesh("lamp", (quad(corners, (0, -1, 0)), glow)))
+def lamp(gltf, center, half_x, half_z, radiance):
+    """A rectangle that shines down."""
+    shape = rectangle(center, (half_x, 0, 0), (0, 0, half_z))
+    gltf.node("lamp", mesh=gltf.mesh("lamp", (shape, gltf.emitter("lamp", radiance))))
 
 
 def glass():
@@ -42,7 +40,7 @@ def glass():
     gltf.node("ground", mesh=gltf.mesh("ground", (tiled(rectangle((0, 0, 0), (8, 0, 0), (0, 0, -8)), 16, 16), ground)))
     clear = gltf.solid("clear glass", 1.5)
     frosted = gltf.solid("frosted glass", 1.5, roughness=0.3)
-    bottle = gltf.solid("bottle glass", 1.52, attenuation=((0.2, 0.75, 0.4), 0.5))
+    bottle = gltf.solid("bottle glass", 1.52, attenuation=((0.35, 0.85, 0.55), 0.5))
     crystal = gltf.solid("crystal", 1.9, attenuation=((0.95, 0.35, 0.45), 0.5))
     ball = gltf.mesh("sphere", (icosphere(3), clear))
     gltf.node("sphere", mesh=ball, translation=(0.25, 0.602, 0.7), scale=[0.6] * 3)
@@ -62,7 +60,7 @@ def glass():
         gltf.node(name, mesh=gltf.mesh(name, (pane, material)))
     sign = rectangle((0.02, 1.0, -1.9), (0.75, 0, 0), (0, 0.3, 0))
     gltf.node("sign", mesh=gltf.mesh("sign", (sign, gltf.emitter("sign", (1.6, 0.8, 0.3)))))
-    lamp(gltf, (-1.0, 4.5, 1.5), 0.9, (10, 9.6, 9))
+    lamp(gltf, (-1.0, 4.5, 1.5), 0.9, 0.9, (13, 12.5, 11.5))
     gltf.environment(radiance=[0.16, 0.19, 0.24])
     view(gltf, (0.3, 2.1, 6.4), (-0.05, 0.62, 0), 30)
     return gltf
@@ -93,7 +91,7 @@ def nested():
         ("more ice", (0.0125, 0.0635, -0.011), 0.8, axis_angle((0.4, 1, -0.3), 50)),
     ]:
         gltf.node(name, mesh=cube, translation=place, scale=[size] * 3, rotation=turn)
-    lamp(gltf, (-0.25, 0.45, -0.2), 0.12, (16, 15, 14))
+    lamp(gltf, (-0.25, 0.45, -0.2), 0.16, 0.16, (9, 8.5, 8))
     gltf.environment(radiance=[0.35, 0.4, 0.48])
     view(gltf, (0.05, 0.19, 0.33), (0, 0.043, 0), 24, aspect=1.2)
     return gltf
@@ -101,7 +99,7 @@ def nested():
 
 def fog():
     gltf = Gltf("Fog: a lamp's halo, a spot light's beam, and shadows in the air")
-    gltf.medium(scattering=[0.08, 0.08, 0.08], absorption=[0.004, 0.003, 0.002], phase="henyey-greenstein", g=0.4)
+    gltf.medium(scattering=[0.05, 0.05, 0.05], absorption=[0.004, 0.003, 0.002], phase="henyey-greenstein", g=0.4)
     ground = gltf.lambert("ground", (0.3, 0.29, 0.27))
     stone = gltf.lambert("stone", (0.6, 0.57, 0.52))
     plane = rectangle((0, 0, 0), (30, 0, 0), (0, 0, -30))
@@ -112,37 +110,37 @@ def fog():
         gltf.node(f"column {i + 1}", mesh=column, translation=(x, 0, z), rotation=turn)
     block = gltf.mesh("block", (cuboid((-0.7, 0, -0.5), (0.7, 0.8, 0.5)), stone))
     gltf.node("block", mesh=block, translation=(0.2, 0, 3.2), rotation=axis_angle((0, 1, 0), 20))
-    bulb = gltf.mesh("lamp", (icosphere(1).flat(), gltf.emitter("lamp", (320, 230, 120))))
-    gltf.node("lamp", mesh=bulb, translation=(0.3, 2.3, -0.4), scale=[0.2] * 3)
-    cone = {"innerConeAngle": 0.1, "outerConeAngle": 0.14}
-    gltf.light("spot", "spot", [0.75, 0.88, 1], 2600, position=(-8, 6.5, -1), direction=(12, -6.3, 2), spot=cone)
+    bulb = gltf.mesh("lamp", (icosphere(1).flat(), gltf.emitter("lamp", (60, 43, 22))))
+    gltf.node("lamp", mesh=bulb, translation=(0.3, 2.3, -0.4), scale=[0.45] * 3)
+    cone = {"innerConeAngle": 0.1, "outerConeAngle": 0.15}
+    gltf.light("spot", "spot", [0.75, 0.88, 1], 2500, position=(-13, 9, -2), direction=(16, -8.8, 2.6), spot=cone)
     view(gltf, (0.6, 2.6, 13), (0, 1.9, 0), 36)
     return gltf
 
 
 def rayleigh():
     gltf = Gltf("Rayleigh sky: air that scatters blue light out of a low sun's")
-    # An ellipsoid of 50 m × 8 m × 50 m about the camera: τ = 0.32 upwards and 2 towards the horizon, at 550 nm.
-    air = gltf.solid("air", 1, medium={"rayleigh550": 0.04})
+    # An ellipsoid of 50 m × 8 m × 50 m about the camera: τ = 0.2 upwards and 1.25 towards the horizon, at 550 nm.
+    air = gltf.solid("air", 1, medium={"rayleigh550": 0.025})
     dome = gltf.mesh("air", (icosphere(3).flat(), air))
     gltf.node("air", mesh=dome, scale=(50, 8, 50))
     ground = gltf.lambert("ground", (0.06, 0.06, 0.055))
     plane = rectangle((0, 0, 0), (80, 0, 0), (0, 0, -80))
     gltf.node("ground", mesh=gltf.mesh("ground", (plane, ground)))
-    chalk = gltf.lambert("chalk", (0.5, 0.5, 0.5))
+    chalk = gltf.lambert("chalk", (0.3, 0.3, 0.3))
     for i, (x, z, size, height) in enumerate([(-3.5, -2, 0.8, 2.6), (0.5, -5, 1.2, 1.2), (3.6, -3, 0.6, 3.4)]):
         stone = cuboid((-size / 2, 0, -size / 2), (size / 2, height, size / 2))
-        turn = axis_angle((0, 1, 0), 20 + 25 * i)
+        turn = axis_angle((0, 1, 0), 50 - 12 * i)
         name = f"stone {i + 1}"
         gltf.node(name, mesh=gltf.mesh(name, (stone, chalk)), translation=(x, 0, z), rotation=turn)
-    # 15° high, to the left and behind.
-    gltf.light("sun", "directional", [1, 1, 1], 20, direction=(0.85, -0.268, -0.53))
+    # 9° high, to the left and behind.
+    gltf.light("sun", "directional", [1, 1, 1], 16, direction=(0.85, -0.16, -0.53))
     view(gltf, (0, 1.6, 6), (0, 2.3, 0), 48)
     return gltf
 
 
 # Ripples on the pool: amplitude, wave numbers along x and z, 1/m, and phase.
-RIPPLES = [(0.022, 6.1, 3.2, 0.3), (0.018, -4.0, 7.0, 1.7), (0.014, 8.6, -5.4, 4.1), (0.012, 2.1, 10.2, 2.6)]
+RIPPLES = [(0.035, 7.5, 0.9, 0.3), (0.02, -10.5, 1.6, 1.7), (0.012, 4.1, -2.2, 4.1), (0.006, 15, 2, 2.6)]
 
 
 def ripple(x, z):
@@ -155,7 +153,7 @@ def ripple_slope(x, z):
 
 
 def caustic():
-    gltf = Gltf("Caustics: a small lamp through rippled water onto the floor of a pool")
+    gltf = Gltf("Caustics: a narrow lamp through rippled water onto the floor of a pool")
     # The water reaches into walls and floor, which end it: no two surfaces share a plane.
     water = gltf.solid("water", 1.33, attenuation=((0.62, 0.88, 0.94), 1))
     body = basin(1.55, -0.1, 36, ripple, ripple_slope)
@@ -171,7 +169,7 @@ def caustic():
         ("front wall", (-1.5, -0.2, 1.5), (1.5, 1.1, 1.8)),
     ]:
         gltf.node(name, mesh=gltf.mesh(name, (cuboid(low, high), plaster)))
-    lamp(gltf, (0.3, 3.2, -0.3), 0.3, (60, 57, 50))
+    lamp(gltf, (0.2, 2.7, -0.4), 0.25, 1.6, (13, 12.3, 11))
     gltf.environment(radiance=[0.1, 0.13, 0.17])
     view(gltf, (0.2, 3.6, 3.6), (0, 0.25, -0.1), 36)
     return gltf
