@@ -80,7 +80,7 @@ const uint TRIANGLE_MATERIAL_MASK = 0x00FFFFFFu;
 const uint TRIANGLE_HAS_NORMALS = 0x80000000u;
 const uint TRIANGLE_HAS_TANGENTS = 0x40000000u;
 const uint TRIANGLE_HAS_COLORS = 0x20000000u;
-// With HAS_ALPHA: this triangle may be cut out (alpha-tested during traversal).
+// With HAS_CANDIDATES: traversal asks surface_is_opaque of this triangle, which may be cut out or skipped.
 const uint TRIANGLE_IS_MASKED = 0x10000000u;
 
 // `vertices` holds two texels each: (position, u), (normal, v).

@@ -24,6 +24,9 @@ layout(constant_id = 16) const bool HAS_SCATTERING = true; // media that scatter
 layout(constant_id = 17) const bool HAS_EQUIANGULAR = true; // distances in them are also sampled by the lights
 layout(constant_id = 18) const uint STRATEGY = 0u;         // STRATEGY_*
 
+// Traversals ask surface_is_opaque of triangles that are marked.
+const bool HAS_CANDIDATES = HAS_ALPHA || HAS_NESTED;
+
 const uint STRATEGY_MIS = 0u;
 const uint STRATEGY_LIGHT_ONLY = 1u;
 const uint STRATEGY_BSDF_ONLY = 2u;

@@ -154,6 +154,9 @@ bool surface_is_opaque(uint instance, uint primitive, vec2 bary)
     if (HAS_NESTED && uvec2(instance, primitive) == surface_skip) {
         return false;
     }
+    if (!HAS_ALPHA) {
+        return true;
+    }
     uvec4 triangle = surface_triangle(instance, primitive);
     Material material = scene_material(triangle.w & TRIANGLE_MATERIAL_MASK);
     return surface_base_color(material, triangle, bary).a >= material.alpha_cutoff;

@@ -1,7 +1,7 @@
 // Traversal by VK_KHR_ray_query. Directions are unit length, t is in metres;
 // nothing is culled. Distances outside t_min < t < t_max do not count.
 //
-// Requires, declared before: layout.glsl (BIND_SCENE, NONE), spec.glsl (HAS_ALPHA),
+// Requires, declared before: layout.glsl (BIND_SCENE, NONE), spec.glsl (HAS_CANDIDATES),
 //   struct Hit { float t; vec2 bary; uint instance; uint primitive; };
 //   bool surface_is_opaque(uint instance, uint primitive, vec2 bary);
 // and, since it must stand before all declarations, in the entry:
@@ -24,7 +24,7 @@ bool query_is_valid(float t_min, float t_max) {
 // Runs the query to its end. Candidates only exist where geometry is not opaque.
 void query_finish(rayQueryEXT query) {
     while (rayQueryProceedEXT(query)) {
-        if (!HAS_ALPHA) continue;
+        if (!HAS_CANDIDATES) continue;
         if (rayQueryGetIntersectionTypeEXT(query, false) != gl_RayQueryCandidateIntersectionTriangleEXT) continue;
         uint instance = uint(rayQueryGetIntersectionInstanceCustomIndexEXT(query, false));
         uint primitive = uint(rayQueryGetIntersectionPrimitiveIndexEXT(query, false));
@@ -36,7 +36,7 @@ void query_finish(rayQueryEXT query) {
 bool trace_closest(vec3 origin, vec3 dir, float t_min, float t_max, out Hit hit) {
     hit = Hit(-1.0, vec2(0.0), NONE, NONE);
     if (!query_is_valid(t_min, t_max)) return false;
-    uint flags = HAS_ALPHA ? gl_RayFlagsNoneEXT : gl_RayFlagsOpaqueEXT;
+    uint flags = HAS_CANDIDATES ? gl_RayFlagsNoneEXT : gl_RayFlagsOpaqueEXT;
     rayQueryEXT query;
     rayQueryInitializeEXT(query, scene, flags, QUERY_ALL, origin, t_min, dir, t_max);
     query_finish(query);
@@ -50,7 +50,7 @@ bool trace_closest(vec3 origin, vec3 dir, float t_min, float t_max, out Hit hit)
 
 bool trace_occluded(vec3 origin, vec3 dir, float t_min, float t_max) {
     if (!query_is_valid(t_min, t_max)) return false;
-    uint flags = gl_RayFlagsTerminateOnFirstHitEXT | (HAS_ALPHA ? gl_RayFlagsNoneEXT : gl_RayFlagsOpaqueEXT);
+    uint flags = gl_RayFlagsTerminateOnFirstHitEXT | (HAS_CANDIDATES ? gl_RayFlagsNoneEXT : gl_RayFlagsOpaqueEXT);
     rayQueryEXT query;
     rayQueryInitializeEXT(query, scene, flags, QUERY_ALL, origin, t_min, dir, t_max);
     query_finish(query);

@@ -182,7 +182,7 @@ bool bvh_intersect(BvhRay ray, uint record, uvec4 v0, uint instance, float t_min
     // Where there is no second triangle v3 equals v0, which makes its sum 0.
     bool meets_first = bvh_inside(first) && first_sum != 0.0 && first_t > t_min && first_t < hit.t;
     bool meets_second = bvh_inside(second) && second_sum != 0.0 && second_t > t_min && second_t < hit.t;
-    if (HAS_ALPHA) {
+    if (HAS_CANDIDATES) {
         if (meets_first && (v2.w & BVH_FIRST_MASKED) != 0u) {
             vec2 bary = bvh_weights(first, first_sum, v2.w >> BVH_FIRST_TURN & 3u);
             meets_first = surface_is_opaque(instance, v0.w, bary);

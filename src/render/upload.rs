@@ -46,7 +46,7 @@ impl SceneData {
         spec.instances = geometry.has_instances();
         spec.inside = solids.may_hold(camera_origins(scene, settings));
         if solids.are_nested {
-            (spec.nested, spec.passage, spec.alpha) = (true, true, true);
+            (spec.nested, spec.passage) = (true, true);
         }
 
         let (texels, first_texels) = texels(&scene.textures);
