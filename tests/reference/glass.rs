@@ -159,7 +159,8 @@ fn cube_shows_its_camera_n_squared_or_nothing() {
     let (mut trapped, count) = (0, 1000);
     for _ in 0..count {
         let d = rng.direction();
-        let value = tracer.radiance(DVec3::new(0.01, 0.02, 0.03), d, 0, &mut rng);
+        let p = DVec3::new(0.01, 0.02, 0.03);
+        let value = tracer.radiance(p, d, tracer.around(p), 0, &mut rng);
         let escapes = d.abs().max_element() > critical;
         match value {
             Some(value) => assert!(escapes && (value - 2.25).abs() < 1e-9, "{d}: {value}"),
@@ -234,4 +235,16 @@ fn placed_solids_are_closed() {
     let [up, down] = reflectance_and_transmittance(&mut scene, 60.0, 25_000);
     assert_is("R", up, 0.110_978, 5e-3);
     assert_is("T", down, 0.450_739, 6e-3);
+}
+
+/// A lamp within glass emits its radiance there: outside it is L (1 − r)/n².
+#[test]
+fn lamp_within_glass_is_dimmer_outside() {
+    let mut scene = empty();
+    add(&mut scene, layer(-2.0, 0.0), glass(0.0));
+    let lamp = square(-Vec3::Y, Vec3::Y, 1e3);
+    add(&mut scene, lamp, emitter(0.0, 3.0));
+    scene.cameras = vec![parallel(DVec3::Y * 4.0, DVec3::ZERO, 0.1)];
+    let mean = traced(&scene, 4, 40_000, 1)[0];
+    assert_is("lamp", mean, 3.0 * 0.96 / 2.25, 5e-3);
 }

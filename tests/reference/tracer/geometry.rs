@@ -72,17 +72,21 @@ impl Geometry {
     pub fn closest(&self, origin: DVec3, direction: DVec3, skip: usize) -> Option<Hit> {
         let inverse = direction.recip();
         let mut best: Option<Hit> = None;
-        let mut stack = vec![0];
-        while let Some(n) = stack.pop() {
-            let Some(node) = self.nodes.get(n) else {
-                break;
-            };
+        // Halving 2⁶⁴ triangles leaves no more than 64 nodes to come back to.
+        let mut stack = [0; 65];
+        let mut waiting = usize::from(!self.nodes.is_empty());
+        while waiting > 0 {
+            waiting -= 1;
+            let n = stack[waiting];
+            let node = &self.nodes[n];
             let limit = best.map_or(f64::INFINITY, |hit| hit.t);
             if !meets(node, origin, inverse, limit) {
                 continue;
             }
             if node.count == 0 {
-                stack.extend([node.first, n + 1]);
+                stack[waiting] = node.first;
+                stack[waiting + 1] = n + 1;
+                waiting += 2;
                 continue;
             }
             for triangle in node.first..node.first + node.count {

@@ -2,7 +2,7 @@
 //!
 //! [Kajiya86] Kajiya, The Rendering Equation.
 
-use etendue::scene::{AlphaMode, Material, Scene};
+use etendue::scene::{AlphaMode, Material, Projection, Scene};
 use glam::{DVec3, Vec3};
 
 use super::dielectric::{Interface, Way, solid, thin};
@@ -122,14 +122,18 @@ impl<'a> Tracer<'a> {
 
     fn pixel(&self, plan: &Plan, pixel: usize) -> Pixel {
         let (x, y) = (pixel as u32 % plan.side, pixel as u32 / plan.side);
+        let camera = &self.scene.cameras[0];
+        // A pinhole is one point; parallel rays start at many.
+        let pinhole = matches!(camera.projection, Projection::Perspective { .. })
+            .then(|| self.around(camera.world_from_camera.translation));
         let mut result = Pixel::default();
         for channel in 0..plan.channels {
             let mut rng = Rng::new(&[plan.seed, pixel as u64, channel as u64]);
             let (mut mean, mut squares) = (0.0, 0.0);
             for n in 1..=plan.samples {
-                let (origin, direction) =
-                    camera::ray(&self.scene.cameras[0], plan.side, x, y, &mut rng);
-                let value = self.radiance(origin, direction, channel, &mut rng);
+                let (position, direction) = camera::ray(camera, plan.side, x, y, &mut rng);
+                let inside = pinhole.unwrap_or_else(|| self.around(position));
+                let value = self.radiance(position, direction, inside, channel, &mut rng);
                 let value = value.unwrap_or_else(|| {
                     result.given_up += 1;
                     0.0
@@ -146,18 +150,25 @@ impl<'a> Tracer<'a> {
         result
     }
 
-    /// One estimate of the radiance that arrives at `origin` against `direction`, cd/m²;
+    /// The shells around a point.
+    pub fn around(&self, p: DVec3) -> Inside {
+        // Any direction will do; this one lies in no plane or edge of the scenes.
+        let direction = DVec3::new(0.3141, 0.5926, 0.5358).normalize();
+        self.solids.around(&self.geometry, p, direction)
+    }
+
+    /// One estimate of the radiance that arrives at `position` against `direction`, cd/m²;
     /// `None` when the path was given up.
     pub fn radiance(
         &self,
-        origin: DVec3,
+        position: DVec3,
         direction: DVec3,
+        inside: Inside,
         channel: usize,
         rng: &mut Rng,
     ) -> Option<f64> {
-        let inside = self.solids.around(&self.geometry, origin, direction);
         let mut walk = Walk {
-            position: origin,
+            position,
             direction,
             from: NONE,
             inside,
