@@ -19,6 +19,7 @@ mod compare;
 mod furnace;
 mod glass;
 mod lobes;
+mod matter;
 mod opaque;
 mod scattering;
 

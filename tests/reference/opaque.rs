@@ -38,6 +38,21 @@ pub fn lit_room() -> Scene {
     scene
 }
 
+/// A sky that is different everywhere.
+pub fn uneven_sky() -> Environment {
+    let texel = |i: usize| {
+        let (x, y) = (i as f32 % 16.0, (i / 16) as f32);
+        [0.2 + 0.1 * x, 1.0 + 0.1 * y, 2.0 - 0.1 * x]
+    };
+    Environment::Map {
+        width: 16,
+        height: 8,
+        texels: Arc::new((0..128).map(texel).collect()),
+        intensity: 1.5,
+        rotation: 0.8,
+    }
+}
+
 #[test]
 fn metal_and_plastic_in_a_room() {
     let mut scene = lit_room();
@@ -84,18 +99,7 @@ fn tinted_coats_half_metals_and_mirrors_under_a_sky() {
         square(Vec3::Z, Vec3::new(0.0, 0.6, 0.8), 0.5),
         pane,
     );
-    // A sky that is different everywhere.
-    let texel = |i: usize| {
-        let (x, y) = (i as f32 % 16.0, (i / 16) as f32);
-        [0.2 + 0.1 * x, 1.0 + 0.1 * y, 2.0 - 0.1 * x]
-    };
-    scene.environment = Some(Environment::Map {
-        width: 16,
-        height: 8,
-        texels: Arc::new((0..128).map(texel).collect()),
-        intensity: 1.5,
-        rotation: 0.8,
-    });
+    scene.environment = Some(uneven_sky());
     scene.cameras = vec![pinhole(DVec3::new(0.5, 2.0, 4.0), DVec3::ZERO, 45.0)];
     let c = Comparison {
         channels: 3,

@@ -63,6 +63,12 @@ impl Interface {
             (fresnel * self.strength).min(1.0)
         }
     }
+
+    /// Reflected fraction of a sheet: 2r/(1 + r) is the sum of all reflections between its faces.
+    fn sheet_reflectance(&self, cosine: f64) -> f64 {
+        let r = fresnel(cosine, self.eta).0;
+        self.reflectance(2.0 * r / (1.0 + r))
+    }
 }
 
 /// A direction in and its place relative to the shading normal.
@@ -92,34 +98,24 @@ pub fn solid(wo: DVec3, ns: DVec3, ng: DVec3, i: &Interface, rng: &mut Rng) -> O
     if i.alpha > 0.0 && (i.eta - 1.0).abs() >= MATCHED {
         return rough_solid(wo, ns, ng, i, rng);
     }
-    let (f, beyond) = fresnel(wo.dot(ns), i.eta);
-    if rng.happens(i.reflectance(f)) {
-        let wi = mirrored(wo, ns);
-        let wi = if wi.dot(ng) > 0.0 {
-            wi
-        } else {
-            mirrored(wo, ng)
-        };
-        return Some(Way {
-            wi,
-            weight: 1.0,
-            crosses: false,
-        });
+    let (mut n, (mut f, mut beyond)) = (ns, fresnel(wo.dot(ns), i.eta));
+    if f < 1.0 && refracted(wo, ns, i.eta, beyond).dot(ng) >= 0.0 {
+        // The shading normal would send light back: the geometric one decides everything.
+        n = ng;
+        (f, beyond) = fresnel(wo.dot(ng), i.eta);
     }
-    let mut wi = refracted(wo, ns, i.eta, beyond);
-    if wi.dot(ng) >= 0.0 {
-        // The shading normal sends it back: the geometric one decides, if it lets light through.
-        let (f, beyond) = fresnel(wo.dot(ng), i.eta);
-        if f >= 1.0 {
-            return None;
-        }
-        wi = refracted(wo, ng, i.eta, beyond);
-    }
-    Some(Way {
-        wi: wi.normalize(),
-        weight: i.tint,
-        crosses: true,
-    })
+    let crosses = !rng.happens(i.reflectance(f));
+    let (wi, weight) = if crosses {
+        (refracted(wo, n, i.eta, beyond), i.tint)
+    } else {
+        (mirrored(wo, n), 1.0)
+    };
+    let way = Way {
+        wi,
+        weight,
+        crosses,
+    };
+    on_its_side(way, ng)
 }
 
 /// [Walter07] §4 and §5, with normals drawn as `wo` sees them: the weight of a
@@ -156,12 +152,8 @@ fn rough_solid(wo: DVec3, ns: DVec3, ng: DVec3, i: &Interface, rng: &mut Rng) ->
 /// Light at an infinitely thin sheet: the sum of the reflections between its two
 /// faces, R = 2r/(1 + r) and T = (1 − r)/(1 + r), passes straight on.
 pub fn thin(wo: DVec3, ns: DVec3, ng: DVec3, i: &Interface, rng: &mut Rng) -> Option<Way> {
-    let both = |f: f64| {
-        let r = i.reflectance(f);
-        2.0 * r / (1.0 + r)
-    };
     if i.alpha == 0.0 {
-        let reflects = rng.happens(both(fresnel(wo.dot(ns), i.eta).0));
+        let reflects = rng.happens(i.sheet_reflectance(wo.dot(ns)));
         let wi = if reflects { mirrored(wo, ns) } else { -wo };
         let way = Way {
             wi,
@@ -173,7 +165,7 @@ pub fn thin(wo: DVec3, ns: DVec3, ng: DVec3, i: &Interface, rng: &mut Rng) -> Op
     let frame = Frame::new(ns);
     let local = frame.local(wo);
     let m = visible_normal(local, i.alpha, rng);
-    let crosses = !rng.happens(both(fresnel(local.dot(m).min(1.0), i.eta).0));
+    let crosses = !rng.happens(i.sheet_reflectance(local.dot(m).min(1.0)));
     let wi = mirrored(local, m);
     if wi.z <= 0.0 {
         return None;
