@@ -12,12 +12,13 @@ use crate::scattering::matched;
 
 const BOTH: &[BackendChoice] = &[BackendChoice::Bvh, BackendChoice::RayQuery];
 
-/// Rooms: light is met by chance, so the reference needs many paths.
+/// Rooms: light is met by chance, so the reference needs many paths; the bounds are
+/// what these can show beside other tests in a quarter of an hour.
 fn in_a_room() -> Comparison {
     Comparison {
         reference: 8192,
-        image: 1.5e-2,
-        tile: 4e-2,
+        image: 2.5e-2,
+        tile: 7e-2,
         ..Comparison::default()
     }
 }
