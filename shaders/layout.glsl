@@ -13,11 +13,13 @@ const uint NONE = 0xFFFFFFFFu;
 
 const uint CAMERA_PERSPECTIVE = 0u;
 const uint CAMERA_ORTHOGRAPHIC = 1u;
+const uint CAMERA_IRRADIANCE = 2u;  // a white Lambert surface at camera_position that faces camera_forward; HAS_SENSOR
+const uint CAMERA_FLUX = 3u;        // everything that leaves a sphere about camera_position; HAS_SENSOR
 
 struct Params {
     vec3 camera_position;    // perspective: pinhole; orthographic: centre of the image plane
     uint camera_kind;        // CAMERA_*
-    vec3 camera_right;       // image x axis, scaled to half the image's width (at distance 1 when perspective)
+    vec3 camera_right;       // image x axis, scaled to half the image's width (at distance 1 when perspective); sensors: x is the scene's radius
     uint width;              // full frame, pixels
     vec3 camera_up;          // image y axis, scaled to half the height
     uint height;             // full frame, pixels

@@ -56,6 +56,7 @@ struct PathState {
     float scale;           // radiance at the camera over radiance here: (n_camera / n)²
     Flight flight;         // that led to the last scattering in a medium
     bool is_alive;
+    bool is_sensor;        // at the surface of a light meter, which is no event
     // With HAS_PASSAGE: direct light that is on its way, and more that waits for it.
     Shadow shadow;
     Shadow next_shadow;
@@ -178,8 +179,35 @@ PathState path_start(Ray ray)
     path.scale = 1.0;
     path.flight = flight_none();
     path.is_alive = true;
+    path.is_sensor = HAS_SENSOR && params.camera_kind == CAMERA_IRRADIANCE;
     path.shadow = path.next_shadow = shadow_none();
     return path;
+}
+
+// The white Lambert surface of a light meter: what leaves it is the irradiance over π.
+SurfacePoint path_sensor()
+{
+    SurfacePoint s;
+    s.position = params.camera_position;
+    // It may lie on a surface of the scene.
+    s.error = vec3(POSITION_ROUNDINGS * EPSILON) * (abs(s.position) + params.camera_right.x);
+    s.ng = s.ns = params.camera_forward;
+    s.is_front = true;
+    s.area = 0.0;
+    s.alpha = 1.0;
+    s.emission = vec3(0.0);
+    s.emission_pdf = 0.0;
+    s.base_color = vec3(1.0);
+    s.metallic = 0.0;
+    s.roughness = 1.0;
+    s.dielectric_f0 = vec3(0.0);
+    s.dielectric_f90 = 0.0;
+    s.material = NONE;
+    s.is_solid = false;
+    s.transmission = 0.0;
+    s.ior = 1.0;
+    s.strength = vec3(1.0);
+    return s;
 }
 
 // Starts the path in the solids that hold the camera.
@@ -237,7 +265,7 @@ void path_surface(inout PathState path, inout PathResult result, uvec4 key, uint
         return;
     }
 
-    bool is_last = path.depth >= params.max_depth;
+    bool is_last = !path.is_sensor && path.depth >= params.max_depth;
     if (is_last && !bsdf_is_straight(bsdf)) {
         result.truncated = (path.beta.x + path.beta.y + path.beta.z) / 3.0;
         path.is_alive = false;
@@ -291,7 +319,8 @@ void path_surface(inout PathState path, inout PathResult result, uvec4 key, uint
     path_leave(path, s, origin, normalize(frame * next.wi));
     // A shading normal can send light to the wrong side of the surface: such samples carry nothing.
     float side = dot(path.ray.direction, s.ng);
-    path.depth++;
+    path.depth += path.is_sensor ? 0u : 1u;
+    path.is_sensor = false;
     path.chain = next.pdf > 0.0 ? 0u : path.chain + 1u;
     path.is_alive = (next.is_transmitted ? side < 0.0 : side > 0.0) && path_survives(path, u.w);
     path.pdf = next.pdf;
@@ -308,7 +337,7 @@ PathResult path_trace(uvec4 key, uvec2 pixel)
     result.truncated = 0.0;
     result.rays = 0u;
 
-    Ray camera = camera_ray(pixel, rng_uniform(key, 0u, SLOT_CAMERA).xy);
+    Ray camera = camera_ray(pixel, rng_uniform(key, 0u, SLOT_CAMERA));
     PathState path = path_start(camera);
     bool is_search = HAS_INSIDE;
     InteriorSearch search = interior_search();
@@ -335,12 +364,13 @@ PathResult path_trace(uvec4 key, uvec2 pixel)
             surface_skip = is_search ? search.last : uvec2(NONE);
         }
         Hit hit;
-        bool is_hit = false;
-        if (t_max > 0.0) {
+        bool is_sensor = path.is_sensor && !is_shadow && !is_search;
+        bool is_hit = is_sensor;
+        if (!is_sensor && t_max > 0.0) {
             result.rays++;
             is_hit = trace_closest(ray.origin, ray.direction, 0.0, t_max, hit);
         }
-        if (HAS_MEDIA && !is_search) {
+        if (HAS_MEDIA && !is_search && !is_sensor) {
             float end = max((is_hit ? hit.t : t_max) + lead, 0.0);
             if (is_shadow) {
                 path.shadow.value *= medium_transmittance(scene_medium(path.shadow.interior.current), end);
@@ -369,7 +399,11 @@ PathResult path_trace(uvec4 key, uvec2 pixel)
         Bsdf bsdf;
         vec3 through = vec3(0.0);
         if (is_hit) {
-            s = surface_point(hit, -ray.direction);
+            if (is_sensor) {
+                s = path_sensor();
+            } else {
+                s = surface_point(hit, -ray.direction);
+            }
             if (is_search) {
                 bool is_found;
                 path.ray.origin = interior_note(search, hit, s, is_found);

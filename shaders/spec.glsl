@@ -22,7 +22,8 @@ layout(constant_id = 14) const bool HAS_INSIDE = true;     // the camera may be 
 layout(constant_id = 15) const bool HAS_MEDIA = true;      // anything that absorbs or scatters
 layout(constant_id = 16) const bool HAS_SCATTERING = true; // media that scatter
 layout(constant_id = 17) const bool HAS_EQUIANGULAR = true; // distances in them are also sampled by the lights
-layout(constant_id = 18) const uint STRATEGY = 0u;         // STRATEGY_*
+layout(constant_id = 18) const bool HAS_SENSOR = true;      // a light meter that is no camera
+layout(constant_id = 19) const uint STRATEGY = 0u;         // STRATEGY_*
 
 // Traversals ask surface_is_opaque of triangles that are marked.
 const bool HAS_CANDIDATES = HAS_ALPHA || HAS_NESTED;

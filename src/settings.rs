@@ -3,6 +3,8 @@
 
 use std::ops::Range;
 
+use glam::DVec3;
+
 use crate::error::{Error, Result};
 
 /// Which traversal answers "what does this ray meet?".
@@ -60,6 +62,39 @@ pub enum Strategy {
     BsdfOnly,
 }
 
+/// A light meter that takes the place of the camera: every pixel is one reading of the same thing.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Sensor {
+    /// Light that falls on a point of a surface. A pixel is the irradiance over π.
+    Irradiance {
+        /// Where, metres.
+        position: DVec3,
+        /// Unit normal of the surface.
+        normal: DVec3,
+    },
+    /// Light along a ray that arrives at a point. A pixel is the radiance.
+    Radiance {
+        /// Where it arrives, metres.
+        position: DVec3,
+        /// Where the meter looks, unit length.
+        direction: DVec3,
+    },
+    /// Light that the whole scene sends into a direction. A pixel is the mean radiance over a square that holds the scene.
+    Intensity {
+        /// Where the light goes, unit length.
+        direction: DVec3,
+    },
+    /// Light that the whole scene sends anywhere. A pixel is the mean radiance over directions and the disc of the scene's sphere.
+    Flux,
+}
+
+impl Sensor {
+    /// Whether it starts its rays in another way than a camera.
+    pub(crate) fn needs_kernel(self) -> bool {
+        matches!(self, Self::Irradiance { .. } | Self::Flux)
+    }
+}
+
 /// A rectangle of pixels of the full frame; half open.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Crop {
@@ -96,6 +131,8 @@ pub struct Settings {
     pub strategy: Strategy,
     /// Which camera of the scene; `None` is the first, or one that frames the scene.
     pub camera: Option<usize>,
+    /// A light meter instead of the camera.
+    pub sensor: Option<Sensor>,
     /// Also average albedo, normal, depth and coverage of the first hit.
     pub aovs: bool,
 }
@@ -113,6 +150,7 @@ impl Default for Settings {
             estimator: Estimator::Full,
             strategy: Strategy::Mis,
             camera: None,
+            sensor: None,
             aovs: false,
         }
     }

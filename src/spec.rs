@@ -44,6 +44,8 @@ pub struct Spec {
     pub scattering: bool,
     /// Distances in them are also sampled by the lights.
     pub equiangular: bool,
+    /// A light meter that is no camera.
+    pub sensor: bool,
     /// How direct light is found.
     pub strategy: Strategy,
 }
@@ -55,6 +57,7 @@ impl Spec {
     pub fn for_scene(scene: &Scene, settings: &Settings) -> Self {
         let mut spec = Self {
             aovs: settings.aovs,
+            sensor: settings.sensor.is_some_and(|s| s.needs_kernel()),
             strategy: settings.strategy,
             punctual: scene.lights.iter().any(|l| l.intensity.max_element() > 0.0),
             environment: matches!(
@@ -110,12 +113,13 @@ impl Spec {
             media: true,
             scattering: true,
             equiangular: self.equiangular,
+            sensor: self.sensor,
             strategy: self.strategy,
         }
     }
 
     /// Names of the features with their state, for people and files.
-    pub fn features(&self) -> [(&'static str, bool); 18] {
+    pub fn features(&self) -> [(&'static str, bool); 19] {
         [
             ("textures", self.textures),
             ("alpha", self.alpha),
@@ -135,6 +139,7 @@ impl Spec {
             ("media", self.media),
             ("scattering", self.scattering),
             ("equiangular", self.equiangular),
+            ("sensor", self.sensor),
         ]
     }
 

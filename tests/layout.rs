@@ -128,6 +128,7 @@ fn features_switch_the_constant_of_their_name() {
             "media" => spec.media = true,
             "scattering" => spec.scattering = true,
             "equiangular" => spec.equiangular = true,
+            "sensor" => spec.sensor = true,
             _ => panic!("{name} is not a field of Spec that this test knows"),
         }
         let on: Vec<u32> = spec

@@ -23,6 +23,8 @@ pub struct Arguments {
 pub enum Command {
     /// Render a scene
     Render(Box<RenderArgs>),
+    /// Measure light in a scene: irradiance, radiance, intensity or flux
+    Measure(Box<MeasureArgs>),
     /// Show devices and, with a scene, what it holds and needs
     Info(InfoArgs),
 }
@@ -35,6 +37,86 @@ pub struct InfoArgs {
     /// Print one JSON object
     #[arg(long)]
     pub json: bool,
+}
+
+/// `etendue measure`
+#[derive(Args)]
+#[command(group = clap::ArgGroup::new("quantity").required(true))]
+pub struct MeasureArgs {
+    /// Scene: .gltf or .glb
+    pub scene: PathBuf,
+    /// Light on a surface at a point, which faces N (lx)
+    #[arg(long, group = "quantity", value_name = "X,Y,Z,NX,NY,NZ", allow_hyphen_values = true, value_parser = numbers::<6>)]
+    pub irradiance: Option<[f64; 6]>,
+    /// Light that arrives at a point, seen into direction D (cd/m²)
+    #[arg(long, group = "quantity", value_name = "X,Y,Z,DX,DY,DZ", allow_hyphen_values = true, value_parser = numbers::<6>)]
+    pub radiance: Option<[f64; 6]>,
+    /// Light of a node and what hangs on it, alone in the dark, into direction D (cd)
+    #[arg(long, group = "quantity", value_name = "NODE,DX,DY,DZ")]
+    pub intensity: Option<String>,
+    /// All light of a node and what hangs on it, alone in the dark (lm)
+    #[arg(long, group = "quantity", value_name = "NODE")]
+    pub flux: Option<String>,
+
+    /// Take the scene's units as radiometric (W instead of lm) at this wavelength, and show photons a second as well
+    #[arg(long, value_name = "NM", allow_negative_numbers = true, value_parser = positive)]
+    pub wavelength: Option<f64>,
+    /// Samples at most, in thousands [default: 1024]; the first limit reached stops
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(2..=MAX_SAMPLES))]
+    pub spp: Option<u64>,
+    /// Seconds of measuring at most; at least one pass is measured
+    #[arg(long, value_name = "SECONDS", allow_negative_numbers = true, value_parser = positive)]
+    pub time: Option<f64>,
+    /// Stop when the standard error is at most X of the luminance-weighted value
+    #[arg(long, value_name = "X", allow_negative_numbers = true, value_parser = positive)]
+    pub noise: Option<f64>,
+    /// Seed of the random numbers
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    pub seed: u64,
+    /// Latitude-longitude image that lights the scene, .hdr or .exr; replaces the scene's own
+    #[arg(long, value_name = "FILE")]
+    pub env: Option<PathBuf>,
+    /// Factor on the image's values
+    #[arg(long, value_name = "X", requires = "env", default_value_t = 1.0, allow_negative_numbers = true, value_parser = not_negative)]
+    pub env_intensity: f64,
+    /// Rotation of the image about +Y, right-handed
+    #[arg(long, value_name = "DEGREES", requires = "env", default_value_t = 0.0,
+          allow_negative_numbers = true, value_parser = finite)]
+    pub env_rotation: f64,
+    /// Scattering events at most; 0: unlimited
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    pub max_depth: u32,
+    /// How rays are traced
+    #[arg(long, value_enum, default_value_t = Backend::Auto)]
+    pub backend: Backend,
+    /// Vulkan device, by index or a part of its name
+    #[arg(long, value_name = "INDEX|NAME")]
+    pub device: Option<String>,
+    /// Print one JSON object
+    #[arg(long)]
+    pub json: bool,
+    /// Show errors only
+    #[arg(short, long)]
+    pub quiet: bool,
+}
+
+/// Exactly N finite numbers between commas.
+pub fn numbers<const N: usize>(text: &str) -> Result<[f64; N], String> {
+    let parse = |part: &str| {
+        let number: f64 = part
+            .trim()
+            .parse()
+            .map_err(|_| format!("{part:?} is not a number"))?;
+        if number.is_finite() {
+            Ok(number)
+        } else {
+            Err(format!("{part} is not finite"))
+        }
+    };
+    let all: Vec<f64> = text.split(',').map(parse).collect::<Result<_, _>>()?;
+    let count = all.len();
+    all.try_into()
+        .map_err(|_| format!("{count} numbers, not {N}"))
 }
 
 /// `etendue render`

@@ -6,6 +6,7 @@ mod failure;
 mod header;
 mod info;
 mod interrupt;
+mod measure;
 mod progress;
 mod render;
 mod stats;
@@ -28,6 +29,10 @@ pub fn main() -> ExitCode {
             let quiet = args.quiet || args.progress == ProgressName::Json;
             log_to_stderr(quiet, args.verbose);
             render::run(&args)
+        }
+        Command::Measure(args) => {
+            log_to_stderr(args.quiet, 0);
+            measure::run(&args)
         }
         Command::Info(args) => {
             log_to_stderr(false, 0);

@@ -96,8 +96,19 @@ fn is_exr(path: &Path) -> bool {
 
 /// The scene with the environment of the command line, and that file's hash.
 fn load(args: &RenderArgs) -> Result<(Scene, Option<String>), Failure> {
-    let mut scene = gltf::load(&args.scene).map_err(Failure::scene)?;
-    let Some(path) = &args.env else {
+    let env = args.env.as_deref();
+    load_scene(&args.scene, env, args.env_intensity, args.env_rotation)
+}
+
+/// A scene, with another environment if one is given: its factor, and its rotation in degrees.
+pub fn load_scene(
+    scene: &Path,
+    env: Option<&Path>,
+    env_intensity: f64,
+    env_rotation: f64,
+) -> Result<(Scene, Option<String>), Failure> {
+    let mut scene = gltf::load(scene).map_err(Failure::scene)?;
+    let Some(path) = env else {
         return Ok((scene, None));
     };
     let loaded = load_environment(path).map_err(Failure::scene)?;
@@ -108,8 +119,8 @@ fn load(args: &RenderArgs) -> Result<(Scene, Option<String>), Failure> {
         ..
     } = &mut environment
     {
-        *intensity = args.env_intensity as f32;
-        *rotation = args.env_rotation.to_radians() as f32;
+        *intensity = env_intensity as f32;
+        *rotation = env_rotation.to_radians() as f32;
     }
     scene.environment = Some(environment);
     scene.warnings.extend(loaded.warnings);

@@ -5,6 +5,7 @@
 pub mod geometry;
 mod lights;
 mod media;
+mod meter;
 mod passes;
 mod report;
 pub mod solids;
@@ -22,6 +23,7 @@ use crate::layout::{self, ProbeHit, ProbeRay};
 use crate::scene::Scene;
 use crate::settings::{BackendChoice, Settings};
 
+pub use meter::Reading;
 pub use report::{
     Control, DeviceInfo, Feature, Ledger, Memory, Progress, Report, SceneModel, Times,
 };

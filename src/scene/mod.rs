@@ -35,6 +35,19 @@ pub struct Instance {
     pub world_from_object: DAffine3,
 }
 
+/// A glTF node, as far as it is asked for by name.
+#[derive(Clone, Debug, Default)]
+pub struct Node {
+    /// Name in the file, or `node N`.
+    pub name: String,
+    /// The node that it hangs on.
+    pub parent: Option<u32>,
+    /// Its own entries of [`Scene::instances`].
+    pub instances: Vec<u32>,
+    /// Its own entries of [`Scene::lights`].
+    pub lights: Vec<u32>,
+}
+
 /// Everything that is needed to compute light transport.
 #[derive(Clone, Debug, Default)]
 pub struct Scene {
@@ -48,6 +61,8 @@ pub struct Scene {
     pub textures: Vec<Texture>,
     /// Point, spot and directional lights in world space.
     pub lights: Vec<PunctualLight>,
+    /// The nodes of the file, by their index there.
+    pub nodes: Vec<Node>,
     /// Cameras in world space, in the order of the file's nodes.
     pub cameras: Vec<Camera>,
     /// Radiance that arrives from infinity; none is black.
@@ -67,6 +82,57 @@ impl Scene {
             .iter()
             .map(|i| self.meshes[i.mesh as usize].triangles.len() as u64)
             .sum()
+    }
+
+    /// A node by its name or, where none is called so, by its index.
+    pub fn find_node(&self, asked: &str) -> Option<usize> {
+        let by_name = self.nodes.iter().position(|n| n.name == asked);
+        let by_index = || asked.parse().ok().filter(|&i| i < self.nodes.len());
+        by_name.or_else(by_index)
+    }
+
+    /// What hangs on a node, alone in the dark: its meshes and lights and those of its descendants.
+    ///
+    /// # Panics
+    /// There is no such node.
+    pub fn luminaire(&self, node: usize) -> Self {
+        assert!(node < self.nodes.len(), "there is no node {node}");
+        // Whether each node hangs on the asked one; a walk up is as long as the tree is deep, so that answers are kept.
+        let mut belongs: Vec<Option<bool>> = vec![None; self.nodes.len()];
+        belongs[node] = Some(true);
+        for start in 0..self.nodes.len() {
+            let mut chain = Vec::new();
+            let mut at = Some(start);
+            let answer = loop {
+                let Some(i) = at else { break false };
+                if let Some(known) = belongs[i] {
+                    break known;
+                }
+                chain.push(i);
+                at = self.nodes[i].parent.map(|p| p as usize);
+            };
+            for i in chain {
+                belongs[i] = Some(answer);
+            }
+        }
+        let kept = self.nodes.iter().zip(&belongs);
+        let kept: Vec<&Node> = kept
+            .filter(|(_, b)| **b == Some(true))
+            .map(|(n, _)| n)
+            .collect();
+        let instances = kept.iter().flat_map(|n| &n.instances);
+        let lights = kept.iter().flat_map(|n| &n.lights);
+        Self {
+            instances: instances
+                .map(|i| self.instances[*i as usize].clone())
+                .collect(),
+            lights: lights.map(|i| self.lights[*i as usize].clone()).collect(),
+            nodes: Vec::new(),
+            cameras: Vec::new(),
+            environment: None,
+            medium: None,
+            ..self.clone()
+        }
     }
 
     /// The camera for scenes that have none: sees all of [`Self::bounds`], see

@@ -60,6 +60,7 @@ fn everything() -> Spec {
         instances: true,
         nested: true,
         equiangular: true,
+        sensor: true,
         aovs: true,
         ..Spec::default().with_everything()
     }
@@ -93,7 +94,7 @@ type Switch = (&'static str, fn(&mut Spec), &'static [u32]);
 
 #[test]
 fn each_feature_removes_code_and_its_buffers() {
-    let off: [Switch; 17] = [
+    let off: [Switch; 18] = [
         (
             "textures",
             |s| s.textures = false,
@@ -127,6 +128,7 @@ fn each_feature_removes_code_and_its_buffers() {
         ("media", |s| s.media = false, &[]),
         ("scattering", |s| s.scattering = false, &[]),
         ("equiangular", |s| s.equiangular = false, &[]),
+        ("sensor", |s| s.sensor = false, &[]),
     ];
     // One kernel is enough: what is switched is the same in both.
     let kernel = KERNELS[0];

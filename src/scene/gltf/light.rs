@@ -10,11 +10,12 @@ use super::{Check, Warnings, get, quote};
 use crate::scene::{LightKind, PunctualLight};
 
 /// Places the lights that the scene's nodes refer to; all lights of the file are checked.
+/// Beside each light its node.
 pub(super) fn load(
     root: &Root,
     nodes: &Nodes,
     warnings: &mut Warnings,
-) -> Check<Vec<PunctualLight>> {
+) -> Check<(Vec<PunctualLight>, Vec<u32>)> {
     let empty = Default::default();
     let defined = root.extensions.lights.as_ref().unwrap_or(&empty);
     let mut checked = Vec::new();
@@ -23,6 +24,7 @@ pub(super) fn load(
         checked.push((kind(light, &user)?, intensity(light, &user)?));
     }
     let mut lights = Vec::new();
+    let mut owners = Vec::new();
     for placed in nodes.iter() {
         let extensions = placed.node.extensions.as_deref();
         let Some(reference) = extensions.and_then(|e| e.light.as_ref()) else {
@@ -44,6 +46,7 @@ pub(super) fn load(
         }
         let own = &defined.lights[index as usize].name;
         let name = own.as_ref().or(placed.node.name.as_ref());
+        owners.push(placed.index as u32);
         lights.push(PunctualLight {
             name: name.map_or_else(|| format!("light {}", lights.len()), Clone::clone),
             kind,
@@ -52,7 +55,7 @@ pub(super) fn load(
             intensity,
         });
     }
-    Ok(lights)
+    Ok((lights, owners))
 }
 
 fn kind(light: &Light, user: &str) -> Check<LightKind> {

@@ -108,7 +108,8 @@ fn load_checked(path: &Path, limits: &Limits) -> Check<Scene> {
         materials.push(Material::default());
     }
     mesh::check_texture_coordinates(&meshes.list, &materials, &mut warnings);
-    let instances = place::instances(&root, &buffers, &nodes, &meshes, limits, &mut warnings)?;
+    let (instances, instance_nodes) =
+        place::instances(&root, &buffers, &nodes, &meshes, limits, &mut warnings)?;
     if instances.is_empty() {
         return Err(String::from(
             "holds nothing to render: no node of the scene places a mesh with triangles",
@@ -116,12 +117,14 @@ fn load_checked(path: &Path, limits: &Limits) -> Check<Scene> {
     }
     let environment = extension::environment(&root, &mut files, &mut textures, &mut warnings)?;
     let medium = medium::of_scene(&root, &mut warnings)?;
+    let (lights, light_nodes) = light::load(&root, &nodes, &mut warnings)?;
     Ok(Scene {
+        nodes: node::owners(&root, &instance_nodes, &light_nodes),
         meshes: std::mem::take(&mut meshes.list),
         instances,
         materials,
         textures: textures.list,
-        lights: light::load(&root, &nodes, &mut warnings)?,
+        lights,
         cameras: view::load(&root, &nodes)?,
         environment,
         medium,

@@ -6,6 +6,7 @@ use glam::{DAffine3, DMat3, DQuat, DVec3};
 
 use super::json::{Node, Root};
 use super::{Check, Limits, Warnings, get};
+use crate::scene;
 
 /// Coordinates beyond this are refused: their squares would overflow single precision.
 pub(super) const FARTHEST: f64 = 1e18;
@@ -48,6 +49,30 @@ impl<'a> Nodes<'a> {
             })
         })
     }
+}
+
+/// Names and places in the tree, with what each node owns.
+pub(super) fn owners(root: &Root, instances: &[u32], lights: &[u32]) -> Vec<scene::Node> {
+    let named = |(i, node): (usize, &Node)| scene::Node {
+        name: match &node.name {
+            Some(name) if !name.is_empty() => name.clone(),
+            _ => format!("node {i}"),
+        },
+        ..Default::default()
+    };
+    let mut nodes: Vec<scene::Node> = root.nodes.iter().enumerate().map(named).collect();
+    for (i, node) in root.nodes.iter().enumerate() {
+        for &child in &node.children {
+            nodes[child as usize].parent = Some(i as u32);
+        }
+    }
+    for (instance, owner) in (0..).zip(instances) {
+        nodes[*owner as usize].instances.push(instance);
+    }
+    for (light, owner) in (0..).zip(lights) {
+        nodes[*owner as usize].lights.push(light);
+    }
+    nodes
 }
 
 /// Computes where every node of the scene is.

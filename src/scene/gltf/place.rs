@@ -10,7 +10,7 @@ use super::node::{FARTHEST, Nodes, Placed, is_singular, unit_quaternion};
 use super::{Check, Limits, Warnings, quote};
 use crate::scene::Instance;
 
-/// Places the meshes that the scene's nodes refer to.
+/// Places the meshes that the scene's nodes refer to; beside each instance its node.
 pub(super) fn instances(
     root: &Root,
     buffers: &Buffers,
@@ -18,9 +18,10 @@ pub(super) fn instances(
     meshes: &Meshes,
     limits: &Limits,
     warnings: &mut Warnings,
-) -> Check<Vec<Instance>> {
+) -> Check<(Vec<Instance>, Vec<u32>)> {
     let mut placer = Placer {
         instances: Vec::new(),
+        owners: Vec::new(),
         meshes,
         limits,
         warnings,
@@ -42,7 +43,7 @@ pub(super) fn instances(
             }
         }
     }
-    let instances = placer.instances;
+    let (instances, owners) = (placer.instances, placer.owners);
     if skinned > 0 {
         warnings.push(format!(
             "{skinned} skinned meshes are shown as they are stored: skins are not applied"
@@ -51,11 +52,12 @@ pub(super) fn instances(
     if !root.animations.is_empty() {
         warnings.push(format!("{} animations are ignored", root.animations.len()));
     }
-    Ok(instances)
+    Ok((instances, owners))
 }
 
 struct Placer<'a> {
     instances: Vec<Instance>,
+    owners: Vec<u32>,
     meshes: &'a Meshes,
     limits: &'a Limits,
     warnings: &'a mut Warnings,
@@ -88,6 +90,7 @@ impl Placer<'_> {
                     self.limits.instances
                 ));
             }
+            self.owners.push(placed.index as u32);
             self.instances.push(Instance {
                 name: placed.name(),
                 mesh,

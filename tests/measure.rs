@@ -1,0 +1,233 @@
+//! The light meter against closed forms: what falls on a point, arrives along a
+//! ray, leaves a lamp in a direction and altogether; and its interval against its own spread.
+#![allow(
+    clippy::unwrap_used,
+    clippy::print_stdout,
+    dead_code,
+    reason = "tests may unwrap and print; not every builder of the common module is used here"
+)]
+
+#[path = "common/mod.rs"]
+mod common;
+
+use std::f64::consts::PI;
+
+use common::*;
+use etendue::render::{Reading, Tuning};
+use etendue::scene::{LightKind, Material, PunctualLight, Scene};
+use etendue::settings::{Sensor, Settings};
+use glam::{DVec3, Vec3};
+
+/// A reading of the sensor from 1024 pixels of `samples`, or none without a device.
+fn read(scene: &Scene, sensor: Sensor, samples: u64, seed: u64) -> Option<Reading> {
+    let settings = Settings {
+        sensor: Some(sensor),
+        seed,
+        ..settings(32, samples)
+    };
+    let rendered = render(scene, &settings, Tuning::default())?;
+    Some(Reading::of(&rendered.film, &sensor, scene).unwrap())
+}
+
+/// The reading is `truth` within the relative bound `delta`, 4.9 standard errors included.
+fn assert_reads(what: &str, scene: &Scene, sensor: Sensor, truth: f64, delta: f64) {
+    let Some(reading) = read(scene, sensor, 1024, 1) else {
+        return;
+    };
+    for (value, error) in reading.value.into_iter().zip(reading.error) {
+        let off = (value - truth).abs();
+        println!(
+            "{what}: {value:.7}, truth {truth:.7}, off {off:.1e} ± {:.1e}",
+            4.9 * error
+        );
+        assert!(
+            off + 4.9 * error <= delta * truth,
+            "{what}: {value} instead of {truth}"
+        );
+    }
+}
+
+fn upwards(position: DVec3) -> Sensor {
+    Sensor::Irradiance {
+        position,
+        normal: DVec3::Y,
+    }
+}
+
+fn punctual(kind: LightKind, position: DVec3, direction: Vec3) -> PunctualLight {
+    PunctualLight {
+        name: String::from("lamp"),
+        kind,
+        position,
+        direction,
+        intensity: Vec3::splat(3.0),
+    }
+}
+
+/// Something black far below, so that the scene has an extent.
+fn nothing() -> Scene {
+    let mut scene = empty();
+    add(
+        &mut scene,
+        square(Vec3::new(0.0, -9.0, 0.0), Vec3::Y, 1.0),
+        lambert(0.0),
+    );
+    scene
+}
+
+#[test]
+fn irradiance_of_lights_without_extent() {
+    for degrees in [0.0f64, 30.0, 60.0, 85.0] {
+        let (sin, cos) = degrees.to_radians().sin_cos();
+        let towards = DVec3::new(sin, cos, 0.0);
+        let mut scene = nothing();
+        scene.lights = vec![punctual(LightKind::Point, 2.0 * towards, Vec3::NEG_Y)];
+        let what = format!("point at {degrees}°");
+        assert_reads(&what, &scene, upwards(DVec3::ZERO), 3.0 * cos / 4.0, 1e-5);
+        scene.lights = vec![punctual(
+            LightKind::Directional,
+            DVec3::ZERO,
+            -towards.as_vec3(),
+        )];
+        let what = format!("sun at {degrees}°");
+        assert_reads(&what, &scene, upwards(DVec3::ZERO), 3.0 * cos, 1e-5);
+    }
+}
+
+#[test]
+fn irradiance_of_skies_and_rooms() {
+    let mut scene = nothing();
+    scene.environment = constant_sky(0.7);
+    assert_reads("sky", &scene, upwards(DVec3::ZERO), 0.7 * PI, 1e-5);
+    let mut scene = empty();
+    add(&mut scene, room(1.0), emitter(0.5, 1.0));
+    // In the air and on the floor itself: E = π L/(1 − ρ).
+    for y in [0.3, -1.0] {
+        let sensor = upwards(DVec3::new(0.2, y, -0.1));
+        assert_reads("room", &scene, sensor, PI / 0.5, 5e-3);
+    }
+}
+
+/// A disc-like square above the meter: the form factor of a square over its centre by quadrature.
+#[test]
+fn irradiance_below_a_square_lamp() {
+    let mut scene = empty();
+    add(
+        &mut scene,
+        square(Vec3::new(0.0, 1.0, 0.0), Vec3::NEG_Y, 0.5),
+        emitter(0.0, 4.0),
+    );
+    let count = 1000;
+    let at = |i: usize| (i as f64 + 0.5) / count as f64 - 0.5;
+    let mut sum = 0.0;
+    for x in (0..count).map(at) {
+        for z in (0..count).map(at) {
+            // cosθ cosθ'/d² with both cosines 1/d.
+            sum += (1.0 + x * x + z * z).powi(-2);
+        }
+    }
+    let truth = 4.0 * sum / (count * count) as f64;
+    assert_reads("square", &scene, upwards(DVec3::ZERO), truth, 5e-3);
+    let looking_up = Sensor::Radiance {
+        position: DVec3::ZERO,
+        direction: DVec3::Y,
+    };
+    assert_reads("its radiance", &scene, looking_up, 4.0, 1e-6);
+}
+
+#[test]
+fn intensity_and_flux_of_a_square_lamp() {
+    for is_double_sided in [false, true] {
+        let mut scene = empty();
+        let material = Material {
+            double_sided: is_double_sided,
+            ..emitter(0.0, 2.0)
+        };
+        add(
+            &mut scene,
+            square(Vec3::new(3.0, 1.0, 0.0), Vec3::Y, 0.5),
+            material,
+        );
+        let sides = if is_double_sided { 2.0 } else { 1.0 };
+        assert_reads("flux", &scene, Sensor::Flux, sides * PI * 2.0, 2e-2);
+        for degrees in [0.0f64, 60.0, 180.0] {
+            let (sin, cos) = degrees.to_radians().sin_cos();
+            let sensor = Sensor::Intensity {
+                direction: DVec3::new(sin, cos, 0.0),
+            };
+            let what = format!("intensity at {degrees}°");
+            if cos > 0.0 || is_double_sided {
+                assert_reads(&what, &scene, sensor, 2.0 * cos.abs(), 1e-2);
+            } else if let Some(reading) = read(&scene, sensor, 16, 1) {
+                assert_eq!(reading.value, [0.0; 3], "{what}");
+            }
+        }
+    }
+}
+
+/// 4πI of a point, and a spot's profile: its flux is its intensity's integral, by quadrature.
+#[test]
+fn flux_of_lights_without_extent() {
+    let alone = |kind| Scene {
+        lights: vec![punctual(kind, DVec3::ZERO, Vec3::NEG_Y)],
+        ..empty()
+    };
+    assert_eq!(flux_of(&alone(LightKind::Point)), 4.0 * PI * 3.0);
+    let spot = alone(LightKind::Spot {
+        cos_inner: 0.9,
+        cos_outer: 0.7,
+    });
+    let count = 20_000;
+    let mut sum = 0.0;
+    for i in 0..count {
+        let cosine = 2.0 * (f64::from(i) + 0.5) / f64::from(count) - 1.0;
+        let sine = (1.0 - cosine * cosine).sqrt();
+        let direction = DVec3::new(sine, -cosine, 0.0);
+        sum += reading_without_surfaces(&spot, Sensor::Intensity { direction });
+    }
+    let truth = 4.0 * PI * sum / f64::from(count);
+    let flux = flux_of(&spot);
+    assert!(
+        (flux / truth - 1.0).abs() < 1e-4,
+        "{flux} instead of {truth}"
+    );
+    // Surfaces would cast shadows that the meter does not know.
+    let mut mixed = nothing();
+    mixed.lights = spot.lights;
+    let film = etendue::film::Film::new(settings(1, 1).window(), (1, 1), false);
+    assert!(Reading::of(&film, &Sensor::Flux, &mixed).is_err());
+}
+
+/// A reading of a scene of lights alone needs no device.
+fn reading_without_surfaces(scene: &Scene, sensor: Sensor) -> f64 {
+    let mut film = etendue::film::Film::new(settings(1, 1).window(), (1, 1), false);
+    film.add(0, 0, vec![0.0; etendue::layout::FILM_FLOATS as usize])
+        .unwrap();
+    Reading::of(&film, &sensor, scene).unwrap().value[0]
+}
+
+fn flux_of(scene: &Scene) -> f64 {
+    reading_without_surfaces(scene, Sensor::Flux)
+}
+
+/// Of 1024 readings (the pixels) the 95 % interval holds the truth in 93 to 97 %: three
+/// standard deviations of chance.
+#[test]
+fn interval_is_what_it_says() {
+    let mut scene = empty();
+    add(&mut scene, room(1.0), emitter(0.5, 1.0));
+    let sensor = upwards(DVec3::new(0.2, 0.3, -0.1));
+    let settings = Settings {
+        sensor: Some(sensor),
+        ..settings(32, 256)
+    };
+    let Some(r) = render(&scene, &settings, Tuning::default()) else {
+        return;
+    };
+    let readings = r.film.mean().into_iter().zip(r.film.standard_error());
+    let held = readings
+        .filter(|(mean, error)| (mean[0] - 2.0).abs() <= 1.96 * error[0])
+        .count();
+    println!("{held} of 1024 intervals hold the truth");
+    assert!((952..=993).contains(&held), "{held} of 1024");
+}
