@@ -23,6 +23,12 @@ const SHADERS: &[(&str, &[&str], &str)] = &[
     ("tests/shading_values.comp", &[], "test_shading_values"),
     ("tests/shading_random.comp", &[], "test_shading_random"),
     ("tests/shading_scene.comp", &[], "test_shading_scene"),
+    (
+        "tests/shading_interface.comp",
+        &[],
+        "test_shading_interface",
+    ),
+    ("tests/shading_media.comp", &[], "test_shading_media"),
     ("examples/needle.comp", &[], "example_needle"),
 ];
 

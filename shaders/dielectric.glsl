@@ -40,7 +40,14 @@ Fresnel fresnel_dielectric(float c, float eta)
     float p = 1.0 / (n2 * c + g);
     float r_s = m * s * s;
     float r_p = (m * p) * ((c * c * (n2 + 1.0) - 1.0) * p);
-    return Fresnel(0.5 * (r_s * r_s + r_p * r_p), 2.0 * c * g * (s * s + p * (n2 * p)), g);
+    float r = 0.5 * (r_s * r_s + r_p * r_p);
+    // The larger is what the smaller leaves: each formula may be a rounding above 1,
+    // and just above the critical angle both follow the rounding of g² differently.
+    if (r < 0.5) {
+        return Fresnel(r, 1.0 - r, g);
+    }
+    float t = 2.0 * c * g * (s * s + p * (n2 * p));
+    return Fresnel(1.0 - t, t, g);
 }
 
 struct Dielectric {

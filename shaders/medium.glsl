@@ -20,14 +20,17 @@ bool medium_scatters(Medium m)
 // Fraction of light left after `distance`. [Beer's law]
 vec3 medium_transmittance(Medium m, float distance)
 {
-    return exp(-m.sigma_t * distance);
+    // Else a driver may scale the coefficient for exp2 first, which overflows: the largest one over no distance is then NaN.
+    precise vec3 depth = m.sigma_t * distance;
+    return exp(-depth);
 }
 
 // Transmittance of each channel relative to that of the clearest: no channel underflows with the others.
 vec3 medium_relative(Medium m, float distance)
 {
     float least = min(m.sigma_t.x, min(m.sigma_t.y, m.sigma_t.z));
-    return exp(-(m.sigma_t - least) * distance);
+    precise vec3 depth = (m.sigma_t - least) * distance;
+    return exp(-depth);
 }
 
 // Probability of drawing a distance by each channel: its share of the throughput.

@@ -17,6 +17,10 @@ struct Case {
     float metallic;
     vec3 f0;    // of the dielectric
     float f90;  // of the dielectric
+    float transmission;
+    float eta;  // of the interface: index beyond it over index here
+    float strength;
+    uint is_solid;
 };
 
 layout(binding = BIND_TEST_CASES, scalar) readonly buffer CasesBlock { Case cases[]; };
@@ -29,8 +33,10 @@ Bsdf case_bsdf(Case c, float cos_o)
     s.roughness = c.roughness;
     s.dielectric_f0 = c.f0;
     s.dielectric_f90 = c.f90;
-    s.transmission = 0.0;
-    return bsdf_of(s, cos_o, 1.0);
+    s.transmission = c.transmission;
+    s.strength = vec3(c.strength);
+    s.is_solid = c.is_solid != 0u;
+    return bsdf_of(s, cos_o, c.eta);
 }
 
 #endif

@@ -33,6 +33,8 @@ pub type Values = [f64; 4];
 pub struct Grid {
     pub theta: Vec<f64>,
     pub phi: Vec<f64>,
+    /// Radians that the border above a row of density 0 is put down.
+    floor: f64,
 }
 
 impl Grid {
@@ -51,16 +53,35 @@ impl Grid {
         let cotangent = wo.z / wo.truncate().length().max(1e-9);
         let spread = (width * (cotangent + 0.02 + 0.5 * width)).min(2.0);
         let phi = invert(PHI, 2.0 * PI, opposite, spread, |p| p / (2.0 * PI));
-        Self { theta, phi }
+        // A sample on the border to a row of density 0 may round across it.
+        Self {
+            theta,
+            phi,
+            floor: 1e-6,
+        }
+    }
+
+    /// Cells of the whole sphere, dense about two lobes that leave opposite to `wo`: as steeply as `wo`
+    /// above, with the cosine `below` to −z under the horizon.
+    pub fn of_interface(wo: DVec3, width: f64, below: f64) -> Self {
+        let half_uniform = |t: f64| 1.0 - t.cos();
+        let half = |cosine: f64| {
+            let center = cosine.min(1.0).acos();
+            invert(THETA / 2, PI / 2.0, center, width, half_uniform)
+        };
+        let mut grid = Self::new(wo, width, PI);
+        grid.theta = half(wo.z);
+        grid.theta
+            .extend(half(below).iter().rev().skip(1).map(|t| PI - t));
+        grid.floor = 0.0;
+        grid
     }
 
     /// Borders in the coordinates of the kernel.
     pub fn edges(&self) -> Vec<f32> {
-        // A sample on the border to a row of density 0 may round across it.
-        const ROUNDING: f64 = 1e-6;
         let polar = |(i, t): (usize, &f64)| {
             let t = if i + 2 == self.theta.len() {
-                t + ROUNDING
+                t + self.floor
             } else {
                 *t
             };
@@ -93,9 +114,14 @@ impl Grid {
 
     /// Integrals over every cell of f(direction) dω.
     pub fn integrate(&self, f: &(impl Fn(DVec3) -> Values + Sync)) -> Vec<Values> {
+        self.integrate_to(CELL_ERROR, f)
+    }
+
+    /// The same with an error of choice in each cell.
+    pub fn integrate_to(&self, error: f64, f: &(impl Fn(DVec3) -> Values + Sync)) -> Vec<Values> {
         let row = |i: usize| {
             let (t, p) = (&self.theta, &self.phi);
-            (0..PHI).map(move |j| adaptive(f, [t[i], t[i + 1], p[j], p[j + 1]], CELL_ERROR))
+            (0..PHI).map(move |j| adaptive(f, [t[i], t[i + 1], p[j], p[j + 1]], error))
         };
         // The rows are dealt out to two threads.
         let rows = |first: usize| -> Vec<Vec<Values>> {

@@ -13,6 +13,10 @@ pub struct Case {
     pub metallic: f32,
     pub f0: [f32; 3],
     pub f90: f32,
+    pub transmission: f32,
+    pub eta: f32,
+    pub strength: f32,
+    pub is_solid: u32,
 }
 
 /// glTF's perceptual roughness; α is its square, 1e-2 … 1.

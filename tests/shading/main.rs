@@ -16,9 +16,14 @@
 mod cells;
 mod environment;
 mod fixture;
+mod fresnel;
+mod interface;
+mod interface_samplers;
 mod lights;
 mod lookups;
+mod media;
 mod oracle;
+mod phase;
 mod random;
 mod samplers;
 mod scene;

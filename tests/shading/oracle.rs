@@ -116,3 +116,84 @@ impl Bsdf {
         (f_cos, pdf)
     }
 }
+
+/// Fresnel's factors (r, T) of unpolarised light, n the far index over the near one. The sum of
+/// squares s − g of the textbook's (c − g)/(c + g) is written as their known difference.
+pub fn fresnel(c: f64, n: f64) -> (f64, f64) {
+    let g2 = (n - 1.0) * (n + 1.0) + c * c;
+    if n == 0.0 || g2 <= 0.0 {
+        return (1.0, 0.0);
+    }
+    let g = g2.sqrt();
+    // n⁴c² − g² = (n² − 1) ((n² + 1) c² − 1)
+    let m = (n - 1.0) * (n + 1.0);
+    let (s, p) = (c + g, n * n * c + g);
+    let r_s = m / (s * s);
+    let r_p = m * ((n * n + 1.0) * c * c - 1.0) / (p * p);
+    let t = 2.0 * c * g * (1.0 / (s * s) + n * n / (p * p));
+    (0.5 * (r_s * r_s + r_p * r_p), t)
+}
+
+/// A dielectric interface or sheet; [Walter07] in double precision.
+#[derive(Clone, Copy, Debug)]
+pub struct Interface {
+    pub eta: f64,
+    pub alpha: f64,
+    pub tint: DVec3,
+    pub strength: DVec3,
+    pub is_thin: bool,
+}
+
+impl Interface {
+    /// What is reflected and what transmitted.
+    pub fn split(&self, c: f64) -> (DVec3, DVec3) {
+        let (mut r, mut t) = fresnel(c, self.eta);
+        if t == 0.0 {
+            return (DVec3::ONE, DVec3::ZERO);
+        }
+        if self.is_thin {
+            (r, t) = (2.0 * r / (1.0 + r), t / (1.0 + r));
+        }
+        (
+            r * self.strength,
+            self.tint * (t + r * (1.0 - self.strength)),
+        )
+    }
+
+    /// f cosθ, without radiance's n², and the density.
+    pub fn eval(&self, wo: DVec3, wi: DVec3) -> (DVec3, f64) {
+        let none = (DVec3::ZERO, 0.0);
+        let is_reflected = wi.z > 0.0;
+        let g1 = |c: f64| 1.0 / (1.0 + lambda(c.abs(), self.alpha));
+        let of = |m: DVec3| distribution(m.z, m.x * m.x + m.y * m.y, self.alpha);
+        let share = |c: f64| {
+            let (r, t) = self.split(c);
+            let p = r.element_sum() / (r.element_sum() + t.element_sum());
+            if is_reflected { (r, p) } else { (t, 1.0 - p) }
+        };
+        if is_reflected || self.is_thin {
+            let mirrored = DVec3::new(wi.x, wi.y, wi.z.abs());
+            let m = (wo + mirrored).normalize();
+            let (share, p) = share(wo.dot(m));
+            let v = visibility(wo.z, mirrored.z, self.alpha);
+            return (
+                share * of(m) * v * mirrored.z,
+                p * reflected_pdf(wo, m, self.alpha),
+            );
+        }
+        let mut m = (wo + self.eta * wi).normalize_or_zero();
+        if m.z < 0.0 {
+            m = -m;
+        }
+        let (cos_o, cos_i) = (wo.dot(m), wi.dot(m));
+        if cos_o <= 0.0 || cos_i >= 0.0 {
+            return none;
+        }
+        let (share, p) = share(cos_o);
+        // Eq. 17 and 21 with the indices 1 and eta, in which radiance's eta² is left out.
+        let jacobian = self.eta.powi(2) * cos_i.abs() / (cos_o + self.eta * cos_i).powi(2);
+        let visible = g1(wo.z) * cos_o * of(m) / wo.z;
+        let f_cos = share * (visible * g1(wi.z) * jacobian);
+        (f_cos, p * visible * jacobian)
+    }
+}

@@ -16,7 +16,7 @@ const SAMPLERS: &[u8] = include_bytes!(concat!(env!("OUT_DIR"), "/test_shading_s
 /// Of `shaders/tests/shading_samplers.comp`.
 const COSINE: u32 = 0;
 const GGX: u32 = 1;
-const BSDF: u32 = 2;
+pub const BSDF: u32 = 2;
 const TRIANGLE: u32 = 3;
 
 /// Constant of `spec.glsl`.
@@ -26,19 +26,19 @@ const HAS_SPECULAR: u32 = 3;
 const INVOCATIONS: usize = 1 << 14;
 const SAMPLES: usize = 1 << 6;
 
-struct Sampler {
+pub struct Sampler {
     kernel: Kernel,
 }
 
-struct Drawn {
+pub struct Drawn {
     /// Of each case: [`CELLS`] counts.
-    counts: Vec<u32>,
+    pub counts: Vec<u32>,
     /// Of each case: mean weight.
-    weights: Vec<DVec3>,
+    pub weights: Vec<DVec3>,
 }
 
 impl Sampler {
-    fn new(device: &std::sync::Arc<Device>, has_specular: bool) -> Self {
+    pub fn new(device: &std::sync::Arc<Device>, has_specular: bool) -> Self {
         let bindings = [BIND_CASES, BIND_INPUT, BIND_OUTPUT, BIND_COUNTS];
         let bindings = bindings.map(|b| (b, BindingKind::Storage));
         let constants = [(HAS_SPECULAR, u32::from(has_specular))];
@@ -47,7 +47,7 @@ impl Sampler {
     }
 
     /// Draws from every case; `edges` one after the other, unused by a lattice.
-    fn draw(&self, kind: u32, cases: &[Case], edges: &[f32], is_lattice: bool) -> Drawn {
+    pub fn draw(&self, kind: u32, cases: &[Case], edges: &[f32], is_lattice: bool) -> Drawn {
         const SEED: u32 = 20_240_607;
         let inputs = (self.kernel.storage(cases), self.kernel.storage(edges));
         let sums = self.kernel.output::<[f32; 4]>(cases.len() * INVOCATIONS);
@@ -91,7 +91,7 @@ fn cases(of: impl Fn(f32) -> Case) -> Vec<Case> {
     ROUGHNESS.iter().flat_map(all).collect()
 }
 
-fn name(what: &str, case: &Case) -> String {
+pub fn name(what: &str, case: &Case) -> String {
     let angle = f64::from(case.wo[2]).min(1.0).acos().to_degrees();
     format!("{what}, roughness {}, {angle:.0}°", case.roughness)
 }
