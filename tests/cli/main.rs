@@ -4,6 +4,7 @@
 
 mod ending;
 mod info;
+mod measure;
 mod render;
 mod support;
 mod usage;

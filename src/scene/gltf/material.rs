@@ -209,12 +209,6 @@ impl Loader<'_, '_> {
             ));
             volume = None;
         }
-        if volume.is_some() && material.ior == 0.0 {
-            return Err(format!(
-                "{}: KHR_materials_volume needs a finite index, which ior 0 is not",
-                self.user
-            ));
-        }
         self.medium(from.medium.as_deref(), &mut volume)?;
         material.volume = volume;
         Ok(())
