@@ -46,13 +46,7 @@ fn ball_of_coloured_glass() {
     let mut scene = lit_room();
     let medium = absorbing(Vec3::new(0.0, 0.5, 3.0));
     let material = filled(glass(0.0), medium, 0);
-    ball(
-        &mut scene,
-        DVec3::new(0.0, -0.3, -0.2),
-        0.6,
-        2,
-        material,
-    );
+    ball(&mut scene, DVec3::new(0.0, -0.3, -0.2), 0.6, 2, material);
     let c = Comparison {
         channels: 3,
         backends: BOTH,
