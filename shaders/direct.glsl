@@ -53,6 +53,7 @@ struct Shadow {
     vec3 value;      // what arrives if nothing is in the way
     Interior interior;
     Ray ray;
+    uint from;       // record of the hit that the ray leaves, or NONE
     float lead;      // metres that the ray starts ahead of what it left
     float t_max;
     bool is_infinite;
@@ -61,7 +62,7 @@ struct Shadow {
 
 Shadow shadow_none()
 {
-    return Shadow(false, vec3(0.0), interior_empty(), Ray(vec3(0.0), vec3(0.0)), 0.0, 0.0, false, vec3(0.0));
+    return Shadow(false, vec3(0.0), interior_empty(), Ray(vec3(0.0), vec3(0.0)), NONE, 0.0, 0.0, false, vec3(0.0));
 }
 
 // Distance left from `origin` to the light; 0 where it is reached.
@@ -70,12 +71,12 @@ float shadow_reach(Shadow s, vec3 origin)
     return s.is_infinite ? T_FAR : max(dot(s.target - origin, s.ray.direction), 0.0);
 }
 
-Shadow shadow_of(Interior interior, vec3 origin, LightSample light, vec3 value)
+Shadow shadow_of(Interior interior, vec3 origin, uint from, LightSample light, vec3 value)
 {
     vec3 to = light.target - origin;
     float t_max = light.is_infinite ? T_FAR : length(to);
     vec3 d = light.is_infinite || !(t_max > 0.0) ? light.wi : to / t_max;
-    return Shadow(true, value, interior, Ray(origin, d), 0.0, t_max, light.is_infinite, light.target);
+    return Shadow(true, value, interior, Ray(origin, d), from, 0.0, t_max, light.is_infinite, light.target);
 }
 
 // Whether all of the light arrives, where surfaces let through all or nothing.
@@ -83,7 +84,7 @@ vec3 shadow_arrives(Shadow s, inout uint rays)
 {
     if (s.t_max > 0.0) {
         rays++;
-        if (trace_occluded(s.ray.origin, s.ray.direction, 0.0, s.t_max)) {
+        if (trace_occluded(s.ray.origin, s.ray.direction, 0.0, s.t_max, s.from)) {
             return vec3(0.0);
         }
     }

@@ -130,7 +130,7 @@ Boundary interior_boundary(Interior here, Hit hit, SurfacePoint s, vec3 d, inout
     for (uint k = 0u; k < INTERIOR_SIZE; k++) {
         surface_skip = uvec2(hit.instance, hit.primitive);
         rays++;
-        if (!trace_closest(again.origin, d, 0.0, t_max, hit)) {
+        if (!trace_closest(again.origin, d, 0.0, t_max, NONE, hit)) {
             break;
         }
         SurfaceSide other = surface_side(hit, d);

@@ -17,11 +17,11 @@ void main()
     }
     ProbeRay ray = probe_rays[i];
     Hit hit;
-    bool is_hit = trace_closest(ray.origin, ray.direction, ray.t_min, ray.t_max, hit);
-    bool is_occluded = trace_occluded(ray.origin, ray.direction, ray.t_min, ray.t_max);
-    ProbeHit result = ProbeHit(-1.0, vec2(0.0), NONE, NONE, is_occluded ? 1u : 0u);
+    bool is_hit = trace_closest(ray.origin, ray.direction, ray.t_min, ray.t_max, ray.from, hit);
+    bool is_occluded = trace_occluded(ray.origin, ray.direction, ray.t_min, ray.t_max, ray.from);
+    ProbeHit result = ProbeHit(-1.0, vec2(0.0), NONE, NONE, NONE, is_occluded ? 1u : 0u);
     if (is_hit) {
-        result = ProbeHit(hit.t, hit.bary, hit.instance, hit.primitive, is_occluded ? 1u : 0u);
+        result = ProbeHit(hit.t, hit.bary, hit.instance, hit.primitive, hit.record, is_occluded ? 1u : 0u);
     }
     probe_hits[i] = result;
 }

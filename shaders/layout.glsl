@@ -211,6 +211,7 @@ struct ProbeRay {
     float t_min;
     vec3 direction;
     float t_max;
+    uint from;                  // record of the hit that the ray leaves, or NONE
 };
 
 struct ProbeHit {
@@ -218,6 +219,7 @@ struct ProbeHit {
     vec2 bary;                  // weights of the second and third vertex
     uint instance;
     uint primitive;             // within the group
+    uint record;                // for `from` of rays that leave the hit
     uint occluded;              // what trace_occluded says of the same ray
 };
 

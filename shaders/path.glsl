@@ -44,6 +44,7 @@ struct PathResult {
 // A path on its way.
 struct PathState {
     Ray ray;
+    uint from;             // record of the hit that the ray leaves, or NONE
     float lead;            // metres along the ray that it starts ahead of the point that it leaves
     vec3 beta;             // throughput without the factor n² of radiance
     uint depth;            // scattering events so far
@@ -66,6 +67,7 @@ struct PathState {
 void path_leave(inout PathState path, SurfacePoint s, vec3 origin, vec3 direction)
 {
     path.ray = Ray(origin, direction);
+    path.from = s.record;
     path.lead = HAS_MEDIA ? dot(origin - s.position, direction) : 0.0;
 }
 
@@ -88,12 +90,13 @@ bool path_survives(inout PathState path, float u)
 }
 
 // Adds direct light that is scattered at `origin`, now or when its shadow ray has arrived.
-void path_light(inout PathState path, inout PathResult result, Interior interior, vec3 origin, LightSample light, vec3 value)
+void path_light(inout PathState path, inout PathResult result, Interior interior, vec3 origin, uint from, LightSample light,
+                vec3 value)
 {
     if (!(max_component(value) > 0.0)) {
         return;
     }
-    Shadow shadow = shadow_of(interior, origin, light, value);
+    Shadow shadow = shadow_of(interior, origin, from, light, value);
     if (!HAS_PASSAGE) {
         result.radiance += shadow_arrives(shadow, result.rays);
     } else if (path.shadow.is_waiting) {
@@ -118,7 +121,7 @@ bool path_scatter(inout PathState path, inout PathResult result, uvec4 key, uint
     Flight flight = Flight(path.ray.origin - path.lead * d, d, end, medium_channels(path.beta), 0.0, 0.0);
     if (HAS_EQUIANGULAR && !is_last) {
         DirectLight direct = direct_along(medium, flight, rng_uniform(key, event, SLOT_SEGMENT), u.z);
-        path_light(path, result, path.interior, direct.at, direct.light, path.scale * path.beta * direct.value);
+        path_light(path, result, path.interior, direct.at, NONE, direct.light, path.scale * path.beta * direct.value);
     }
     MediumSample s = medium_sample(medium, path.beta, end, u.xy);
     path.beta *= s.weight;
@@ -135,11 +138,12 @@ bool path_scatter(inout PathState path, inout PathResult result, uvec4 key, uint
     vec3 at = flight.origin + s.distance * d;
     if (HAS_LIGHTS) {
         DirectLight direct = direct_in_medium(medium, flight, rng_uniform(key, event, SLOT_LIGHT));
-        path_light(path, result, path.interior, at, direct.light, path.scale * path.beta * direct.value);
+        path_light(path, result, path.interior, at, NONE, direct.light, path.scale * path.beta * direct.value);
     }
 
     u = rng_uniform(key, event, SLOT_BSDF);
     path.ray = Ray(at, phase_sample(medium, d, u.yz));
+    path.from = NONE;
     path.lead = 0.0;
     path.pdf = phase_value(medium, d, path.ray.direction);
     path.can_be_sampled = true;
@@ -167,6 +171,7 @@ PathState path_start(Ray ray)
 {
     PathState path;
     path.ray = ray;
+    path.from = NONE;
     path.lead = 0.0;
     path.beta = vec3(1.0);
     path.depth = 0u;
@@ -226,6 +231,7 @@ void path_shadow(inout PathState path, inout PathResult result, bool is_hit, Sur
         path.shadow.value *= through;
         vec3 origin = offset_origin(s.position, s.error, -s.ng);
         path.shadow.ray.origin = origin;
+        path.shadow.from = s.record;
         path.shadow.lead = dot(origin - s.position, path.shadow.ray.direction);
         path.shadow.t_max = shadow_reach(path.shadow, origin);
         path.shadow.interior = beyond;
@@ -287,7 +293,7 @@ void path_surface(inout PathState path, inout PathResult result, uvec4 key, uint
                 there = boundary.beyond;
                 scale = square(path.camera_ior / interior_ior(boundary.after));
             }
-            path_light(path, result, there, origin, light, scale * contribution);
+            path_light(path, result, there, origin, s.record, light, scale * contribution);
         }
     }
 
@@ -352,10 +358,12 @@ PathResult path_trace(uvec4 key, uvec2 pixel)
         }
         Ray ray = path.ray;
         float t_max = T_FAR;
+        uint from = path.from;
         float lead = path.lead;
         if (is_shadow) {
             ray = path.shadow.ray;
             t_max = path.shadow.t_max;
+            from = path.shadow.from;
             lead = path.shadow.lead;
         } else if (!is_search) {
             event++;
@@ -368,7 +376,7 @@ PathResult path_trace(uvec4 key, uvec2 pixel)
         bool is_hit = is_sensor;
         if (!is_sensor && t_max > 0.0) {
             result.rays++;
-            is_hit = trace_closest(ray.origin, ray.direction, 0.0, t_max, hit);
+            is_hit = trace_closest(ray.origin, ray.direction, 0.0, t_max, from, hit);
         }
         if (HAS_MEDIA && !is_search && !is_sensor) {
             float end = max((is_hit ? hit.t : t_max) + lead, 0.0);

@@ -22,6 +22,7 @@ const float MIN_SHADING_COSINE = 1.0e-3;
 struct SurfacePoint {
     vec3 position;
     vec3 error;        // bound on the error of each component of position
+    uint record;       // of the hit: what a ray that starts here does not meet
     vec3 ng;           // unit geometric normal on the side of wo
     vec3 ns;           // unit shading normal; dot(ns, wo) > 0
     bool is_front;     // wo is on the side that the winding calls front
@@ -270,6 +271,7 @@ SurfacePoint surface_point(Hit hit, vec3 wo)
     // Edge form: it stays in the plane to two roundings, unlike a + b + c weighted.
     s.position = shape.v0 + hit.bary.x * shape.e1 + hit.bary.y * shape.e2;
     s.error = shape.error;
+    s.record = hit.record;
     vec3 cross_edges = cross(shape.e1, shape.e2);
     float doubled_area = length(cross_edges);
     vec3 front = cross_edges / doubled_area * (shape.is_mirrored ? -1.0 : 1.0);

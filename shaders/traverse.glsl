@@ -1,6 +1,9 @@
 // The traversal contract: what a ray meets. The entry chooses the backend.
 // Directions are unit length, t is in metres and strictly inside (t_min, t_max);
 // nothing is culled; a cut-out triangle is asked through surface_is_opaque.
+// `from` is the record of the hit that the ray leaves, or NONE: a plane is not met
+// twice, so a traversal may pass over what the record stands for. The ray must start
+// off the plane, on the side that it goes to.
 
 #ifndef TRAVERSE_GLSL
 #define TRAVERSE_GLSL
@@ -12,6 +15,7 @@ struct Hit {
     vec2 bary;      // weights of the second and third vertex
     uint instance;
     uint primitive; // within the instance's group
+    uint record;    // names triangles in one plane, this one among them, for `from`; NONE where there is no name
 };
 
 // Deterministic alpha test; defined in surface.glsl.

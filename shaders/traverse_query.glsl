@@ -2,11 +2,11 @@
 // nothing is culled. Distances outside t_min < t < t_max do not count.
 //
 // Requires, declared before: layout.glsl (BIND_SCENE, NONE), spec.glsl (HAS_CANDIDATES),
-//   struct Hit { float t; vec2 bary; uint instance; uint primitive; };
+//   struct Hit { float t; vec2 bary; uint instance; uint primitive; uint record; };
 //   bool surface_is_opaque(uint instance, uint primitive, vec2 bary);
 // and, since it must stand before all declarations, in the entry:
 //   #extension GL_EXT_ray_query : require
-// `bary` holds the weights of the triangle's second and third vertex.
+// `bary` holds the weights of the triangle's second and third vertex; `record` is NONE, and `from` not used.
 
 #ifndef TRAVERSE_QUERY_GLSL
 #define TRAVERSE_QUERY_GLSL
@@ -33,8 +33,8 @@ void query_finish(rayQueryEXT query) {
     }
 }
 
-bool trace_closest(vec3 origin, vec3 dir, float t_min, float t_max, out Hit hit) {
-    hit = Hit(-1.0, vec2(0.0), NONE, NONE);
+bool trace_closest(vec3 origin, vec3 dir, float t_min, float t_max, uint from, out Hit hit) {
+    hit = Hit(-1.0, vec2(0.0), NONE, NONE, NONE);
     if (!query_is_valid(t_min, t_max)) return false;
     uint flags = HAS_CANDIDATES ? gl_RayFlagsNoneEXT : gl_RayFlagsOpaqueEXT;
     rayQueryEXT query;
@@ -48,7 +48,7 @@ bool trace_closest(vec3 origin, vec3 dir, float t_min, float t_max, out Hit hit)
     return true;
 }
 
-bool trace_occluded(vec3 origin, vec3 dir, float t_min, float t_max) {
+bool trace_occluded(vec3 origin, vec3 dir, float t_min, float t_max, uint from) {
     if (!query_is_valid(t_min, t_max)) return false;
     uint flags = gl_RayFlagsTerminateOnFirstHitEXT | (HAS_CANDIDATES ? gl_RayFlagsNoneEXT : gl_RayFlagsOpaqueEXT);
     rayQueryEXT query;

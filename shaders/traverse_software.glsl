@@ -33,6 +33,8 @@ const uint BVH_FIRST_MASKED = 1u;
 const uint BVH_SECOND_MASKED = 2u;
 const uint BVH_FIRST_TURN = 2u; // shift of two bits
 const uint BVH_SECOND_TURN = 4u;
+const uint BVH_FLAT = 64u;
+const uint BVH_NODE_RECORDS = 24u; // of a node at most
 
 uvec4 bvh_node_texel(uint index) { return texelFetch(bvh_nodes, int(index)); }
 uvec4 bvh_triangle_texel(uint index) { return texelFetch(bvh_triangles, int(index)); }
@@ -198,7 +200,9 @@ bool bvh_intersect(BvhRay ray, uint record, uvec4 v0, uint instance, float t_min
     bool is_second = meets_second && !(meets_first && first_t <= second_t);
     uint turn = v2.w >> (is_second ? BVH_SECOND_TURN : BVH_FIRST_TURN) & 3u;
     vec2 bary = bvh_weights(is_second ? second : first, is_second ? second_sum : first_sum, turn);
-    hit = Hit(is_second ? second_t : first_t, bary, instance, is_second ? v1.w : v0.w);
+    // The same record is in several places where its group is.
+    uint name = !HAS_INSTANCES && (v2.w & BVH_FLAT) != 0u ? record >> 2u : NONE;
+    hit = Hit(is_second ? second_t : first_t, bary, instance, is_second ? v1.w : v0.w, name);
     return true;
 }
 
@@ -238,7 +242,7 @@ uvec2 bvh_pop() {
 uint bvh_waiting() { return bvh_height + (bvh_newest.y != 0u ? 1u : 0u) + (bvh_older.y != 0u ? 1u : 0u); }
 
 // Both traversals; `any_hit` ends at the first hit and is a literal at both calls.
-bool bvh_trace(vec3 origin, vec3 dir, float t_min, float t_max, bool any_hit, out Hit hit) {
+bool bvh_trace(vec3 origin, vec3 dir, float t_min, float t_max, uint from, bool any_hit, out Hit hit) {
     bvh_height = 0u;
     bvh_newest = uvec2(0u);
     bvh_older = uvec2(0u);
@@ -247,7 +251,7 @@ bool bvh_trace(vec3 origin, vec3 dir, float t_min, float t_max, bool any_hit, ou
     uint instance = HAS_INSTANCES ? NONE : 0u; // NONE: in the top level
     uvec2 nodes = uvec2(params.bvh_root, 0x80000000u);
     uvec2 leaves = uvec2(0u);
-    hit = Hit(t_max, vec2(0.0), NONE, NONE);
+    hit = Hit(t_max, vec2(0.0), NONE, NONE, NONE);
     while (true) {
         if (leaves.y == 0u) {
             if ((nodes.y & BVH_NODE_BITS) == 0u) {
@@ -267,6 +271,9 @@ bool bvh_trace(vec3 origin, vec3 dir, float t_min, float t_max, bool any_hit, ou
                 nodes.y &= ~(1u << bit);
                 if ((nodes.y & BVH_NODE_BITS) != 0u) bvh_push(nodes);
                 bvh_visit(index, ray, t_min, hit.t, nodes, leaves);
+                // The box of a plane that the ray leaves is always met.
+                uint place = from - leaves.x;
+                if (!HAS_INSTANCES) leaves.y &= ~(place < BVH_NODE_RECORDS ? 1u << place : 0u);
             }
         }
         // One record before the next node: lanes that have more wait less for those that have none.
@@ -300,13 +307,13 @@ bool bvh_trace(vec3 origin, vec3 dir, float t_min, float t_max, bool any_hit, ou
     return hit.primitive != NONE;
 }
 
-bool trace_closest(vec3 origin, vec3 dir, float t_min, float t_max, out Hit hit) {
-    return bvh_trace(origin, dir, t_min, t_max, false, hit);
+bool trace_closest(vec3 origin, vec3 dir, float t_min, float t_max, uint from, out Hit hit) {
+    return bvh_trace(origin, dir, t_min, t_max, from, false, hit);
 }
 
-bool trace_occluded(vec3 origin, vec3 dir, float t_min, float t_max) {
+bool trace_occluded(vec3 origin, vec3 dir, float t_min, float t_max, uint from) {
     Hit hit;
-    return bvh_trace(origin, dir, t_min, t_max, true, hit);
+    return bvh_trace(origin, dir, t_min, t_max, from, true, hit);
 }
 
 #endif

@@ -153,12 +153,14 @@ shared! {
         t_min: f32,
         direction: [f32; 3],
         t_max: f32,
+        from: u32,
     }
     ProbeHit {
         t: f32,
         bary: [f32; 2],
         instance: u32,
         primitive: u32,
+        record: u32,
         occluded: u32,
     }
 }

@@ -30,7 +30,7 @@
 //! One triangle `v0 v1 v2`, or two with a common edge, `v0 v1 v2` and `v0 v2 v3`: two in a
 //! record take four texel fetches instead of six, and their common edge is tested once.
 //! `v0.xyz`, index of the first triangle within the group; `v1.xyz`, index of the second or
-//! [`NO_TRIANGLE`]; `v2.xyz`, flags: [`FIRST_MASKED`], [`SECOND_MASKED`] and two bits each from
+//! [`NO_TRIANGLE`]; `v2.xyz`, flags: [`FIRST_MASKED`], [`SECOND_MASKED`], [`FLAT`] and two bits each from
 //! [`FIRST_TURN`] and [`SECOND_TURN`], which say which corner of the triangle as it was given is
 //! `v0`; `v3.xyz`, equal to `v0` when there is no second triangle, 0. A leaf entry of the top level:
 //! three words unused, index of the instance, the rest unused. Integers are stored as the bits of a float.
@@ -43,6 +43,8 @@
 //! through compressed wide BVHs. High-Performance Graphics 2017.
 
 mod build;
+#[cfg(test)]
+mod flat;
 mod pairs;
 #[cfg(test)]
 mod tests;
@@ -67,6 +69,8 @@ pub const SECOND_MASKED: u32 = 2;
 pub const FIRST_TURN: u32 = 2;
 /// The same for the second triangle.
 pub const SECOND_TURN: u32 = 4;
+/// Flag of a record whose triangles lie in one plane exactly: a ray that leaves one of them meets none of them.
+pub const FLAT: u32 = 64;
 /// Stands for a second triangle that is not there; not a NaN, so that records compare.
 pub const NO_TRIANGLE: u32 = f32::MAX.to_bits();
 /// Levels of nodes that a top level may have.

@@ -1,10 +1,10 @@
 //! Which triangles share a record. Meshes list neighbours close to each other, so
 //! a search among the next few triangles finds a partner for nearly all.
 
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 use obvhs::aabb::Aabb;
 
-use super::{FIRST_MASKED, FIRST_TURN, NO_TRIANGLE, Record, SECOND_MASKED, SECOND_TURN};
+use super::{FIRST_MASKED, FIRST_TURN, FLAT, NO_TRIANGLE, Record, SECOND_MASKED, SECOND_TURN};
 
 /// How far ahead in the list a partner is looked for.
 const WINDOW: usize = 8;
@@ -32,6 +32,7 @@ impl Pair {
             flags |= (turn as u32) << SECOND_TURN;
             flags |= if is_masked(id) { SECOND_MASKED } else { 0 };
         }
+        flags |= if is_flat([a, b, c, d]) { FLAT } else { 0 };
         let [id, other, flags] = [id, other, flags].map(f32::from_bits);
         [
             a.x, a.y, a.z, id, b.x, b.y, b.z, other, c.x, c.y, c.z, flags, d.x, d.y, d.z, 0.0,
@@ -82,6 +83,29 @@ pub(super) fn pair(corners: &[[Vec3; 3]], boxes: &[Aabb]) -> Vec<Pair> {
         pairs.push(pair);
     }
     pairs
+}
+
+/// Whether four corners lie in one plane, in exact arithmetic; `false` where that is not known. A corner that occurs
+/// twice leaves three, which always do; a plane across an axis is seen at once. Elsewhere the volume that the corners
+/// span is believed only where double precision holds it exactly.
+pub(super) fn is_flat([a, b, c, d]: [Vec3; 4]) -> bool {
+    if d == a {
+        return true;
+    }
+    if (0..3).any(|axis| [b, c, d].iter().all(|v| v[axis] == a[axis])) {
+        return true;
+    }
+    let edges = [b, c, d].map(|v| v.as_dvec3() - a.as_dvec3());
+    // Coordinates that are multiples of one unit, differences below 2¹⁶ units: products of three are below 2⁴⁸, and
+    // their sums below 2⁵¹, so nothing is rounded.
+    let largest = edges
+        .iter()
+        .fold(0.0, |m: f64, e| m.max(e.abs().max_element()));
+    let unit = (largest.log2().floor() - 15.0).exp2();
+    let is_exact = [a, b, c, d]
+        .iter()
+        .all(|v| (v.as_dvec3() / unit).fract() == DVec3::ZERO);
+    is_exact && edges[0].cross(edges[1]).dot(edges[2]) == 0.0
 }
 
 /// Turns that make the edge from the last corner of `a` to its first the edge from the first corner of `b` to its

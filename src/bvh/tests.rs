@@ -3,7 +3,7 @@
 use glam::{Affine3A, EulerRot, Quat, Vec3};
 
 use super::topology::{Effort, Topology};
-use super::traverse::{Hit, Ray, closest, closest_exhaustive, occluded};
+use super::traverse::{Hit, NO_RECORD, Ray, closest, closest_exhaustive, occluded};
 use super::*;
 
 /// SplitMix64: repeatable numbers without a dependency.
@@ -47,7 +47,7 @@ pub(super) fn opaque(_: u32, _: u32, _: [f32; 2]) -> bool {
 }
 
 /// Small triangles in a cube of two metres.
-fn soup(count: usize, size: f32, random: &mut Random) -> Vec<Vec3> {
+pub(super) fn soup(count: usize, size: f32, random: &mut Random) -> Vec<Vec3> {
     (0..count)
         .flat_map(|_| {
             let centre = random.cube();
@@ -72,6 +72,7 @@ pub(super) fn ray(origin: Vec3, direction: Vec3) -> Ray {
         direction,
         t_min: 0.0,
         t_max: f32::INFINITY,
+        from: NO_RECORD,
     }
 }
 
@@ -259,7 +260,11 @@ fn identity_instance_changes_nothing() {
     let two = Bvh::build(&[group], &[InstanceDesc::identity(0)], Quality::Balanced).unwrap();
     for _ in 0..20_000 {
         let ray = ray(random.cube(), random.direction());
-        assert_eq!(closest(&one, &ray, &opaque), closest(&two, &ray, &opaque));
+        let unnamed = closest(&one, &ray, &opaque).map(|hit| Hit {
+            record: NO_RECORD,
+            ..hit
+        });
+        assert_eq!(unnamed, closest(&two, &ray, &opaque));
     }
 }
 

@@ -10,8 +10,8 @@
 use glam::{DVec3, Vec3};
 
 use super::{
-    Bvh, InstanceDesc, Member, Node, Record, STACK_SIZE, byte, grid, members, transform_point,
-    transform_vector, vertex,
+    Bvh, FLAT, InstanceDesc, Member, Node, Record, STACK_SIZE, byte, grid, members,
+    transform_point, transform_vector, vertex,
 };
 
 /// Rounding that the box test must outweigh, relative to the distance to the box's far side, in units of 2⁻²⁴: nine
@@ -35,6 +35,8 @@ pub struct Ray {
     pub t_min: f32,
     /// Upper end, in lengths of the direction.
     pub t_max: f32,
+    /// [`Hit::record`] of the hit that the ray leaves, or [`NO_RECORD`]: what lies in its plane is not met.
+    pub from: u32,
 }
 
 /// Where a ray meets a triangle.
@@ -48,7 +50,14 @@ pub struct Hit {
     pub instance: u32,
     /// Index of the triangle within its group.
     pub primitive: u32,
+    /// Record with this triangle where it is flat and there is one level, else [`NO_RECORD`].
+    pub record: u32,
 }
+
+/// Stands for no record.
+pub const NO_RECORD: u32 = u32::MAX;
+/// Records that a node refers to at most.
+const NODE_RECORDS: u32 = 24;
 
 /// Decides whether a hit on a masked triangle counts: instance, primitive, weights of the second and third vertex.
 pub type IsOpaque<'a> = &'a dyn Fn(u32, u32, [f32; 2]) -> bool;
@@ -219,12 +228,18 @@ fn walk(bvh: &Bvh, world: &Ray, is_opaque: IsOpaque, any: bool) -> Option<Hit> {
                 let hits = node_hits(node, &ray, world.t_min, t_max);
                 nodes = (node[4], hits & NODE_BITS | node[3] >> 24);
                 leaves = (node[5], hits & !NODE_BITS);
+                // The box of a plane that the ray leaves is always met.
+                let place = world.from.wrapping_sub(leaves.0);
+                if !has_instances && place < NODE_RECORDS {
+                    leaves.1 &= !(1 << place);
+                }
             }
         }
         if leaves.1 == 0 {
             continue;
         }
-        let record = &bvh.triangles[(leaves.0 + leaves.1.trailing_zeros()) as usize];
+        let place = leaves.0 + leaves.1.trailing_zeros();
+        let record = &bvh.triangles[place as usize];
         leaves.1 &= leaves.1 - 1;
         let Some(instance_id) = instance else {
             let id = record[3].to_bits();
@@ -249,6 +264,9 @@ fn walk(bvh: &Bvh, world: &Ray, is_opaque: IsOpaque, any: bool) -> Option<Hit> {
         };
         let t_max = best.map_or(world.t_max, |hit| hit.t);
         let mut nearest: Option<Hit> = None;
+        // The same record is in several places where its group is.
+        let is_named = !has_instances && record[11].to_bits() & FLAT != 0;
+        let name = if is_named { place } else { NO_RECORD };
         for member in members(record) {
             let Some((t, bary)) = intersect(record, &member, &ray) else {
                 continue;
@@ -263,6 +281,7 @@ fn walk(bvh: &Bvh, world: &Ray, is_opaque: IsOpaque, any: bool) -> Option<Hit> {
                     bary,
                     instance: instance_id,
                     primitive: member.id,
+                    record: name,
                 });
             }
         }
@@ -314,6 +333,7 @@ pub fn closest_exhaustive(bvh: &Bvh, ray: &Ray, is_opaque: IsOpaque) -> (Option<
                     bary,
                     instance,
                     primitive,
+                    record: NO_RECORD,
                 });
             } else {
                 second = second.min(t);

@@ -1,12 +1,12 @@
 //! The tree checks itself.
 
 use super::{
-    Bvh, Child, FIRST_MASKED, FIRST_TURN, MAX_GROUP_LEVELS, MAX_TOP_LEVELS, Node, Record,
+    Bvh, Child, FIRST_MASKED, FIRST_TURN, FLAT, MAX_GROUP_LEVELS, MAX_TOP_LEVELS, Node, Record,
     SECOND_MASKED, SECOND_TURN, child, child_box, members, vertex,
 };
 
 /// What the flags of a record may be.
-const KNOWN_FLAGS: u32 = FIRST_MASKED | SECOND_MASKED | 3 << FIRST_TURN | 3 << SECOND_TURN;
+const KNOWN_FLAGS: u32 = FIRST_MASKED | SECOND_MASKED | 3 << FIRST_TURN | 3 << SECOND_TURN | FLAT;
 
 /// Bounds in double precision: low, high.
 type Bounds = ([f64; 3], [f64; 3]);

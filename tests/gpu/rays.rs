@@ -83,6 +83,7 @@ fn ray(origin: [f32; 3], direction: [f32; 3], t_max: f32) -> ProbeRay {
         t_min: 0.0,
         direction,
         t_max,
+        from: NONE,
     }
 }
 

@@ -4,7 +4,7 @@
 use std::path::{Path, PathBuf};
 
 use etendue::film::Film;
-use etendue::layout::{ProbeHit, ProbeRay};
+use etendue::layout::{NONE, ProbeHit, ProbeRay};
 use etendue::scene::{Camera, Projection, Scene, gltf};
 use etendue::settings::{BackendChoice, Settings};
 use glam::DVec3;
@@ -50,6 +50,7 @@ pub fn primary_rays(scene: &Scene, (width, height): (u32, u32)) -> Vec<ProbeRay>
                 t_min: 0.0,
                 direction: (pose.matrix3 * to).normalize().as_vec3().to_array(),
                 t_max: 3e38,
+                from: NONE,
             }
         })
         .collect()

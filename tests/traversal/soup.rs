@@ -1,6 +1,6 @@
 //! Random rays at random triangles and at placed meshes, against brute force.
 
-use etendue::layout::ProbeRay;
+use etendue::layout::{NONE, ProbeRay};
 use etendue::scene::Scene;
 use glam::{DVec3, Vec3};
 
@@ -48,6 +48,7 @@ fn random_rays(brute: &Brute, size: f64, count: usize, random: &mut Random) -> V
                 t_min: 0.0,
                 direction: direction.as_vec3().normalize().to_array(),
                 t_max,
+                from: NONE,
             }
         })
         .collect()

@@ -39,6 +39,7 @@ fn case(
             t_min: range[0],
             direction: to,
             t_max: range[1],
+            from: NONE,
         },
         expect,
     }

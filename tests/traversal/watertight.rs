@@ -44,6 +44,7 @@ fn rays_at_edges(mesh: &Mesh, place: &DAffine3, size: f64, random: &mut Random) 
                 t_min: 0.0,
                 direction: direction.normalize().to_array(),
                 t_max: 3e38,
+                from: NONE,
             }
         })
         .collect()
@@ -177,6 +178,7 @@ fn closed_cube_along_the_axes() {
                     t_min: 0.0,
                     direction,
                     t_max: 3e38,
+                    from: NONE,
                 });
             }
         }
