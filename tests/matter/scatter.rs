@@ -80,14 +80,18 @@ fn h_function(w: f64, mu: f64) -> f64 {
 /// Under a white sky the half space shows 1 − √(1 − ϖ) H(μ).
 #[test]
 fn half_space_is_chandrasekhars() {
-    for (albedo, degrees, delta) in [(0.5f64, 0.0f64, 2e-3), (0.9, 60.0, 2e-3), (0.99, 0.0, 4e-3)] {
+    for (albedo, degrees, delta) in [
+        (0.5f64, 0.0f64, 2e-3f64),
+        (0.9, 60.0, 2e-3),
+        (0.99, 0.0, 4e-3),
+    ] {
         let mut scene = empty();
         let medium = grey(1.0 - albedo as f32, albedo as f32, Phase::Isotropic);
         add(&mut scene, layer(200.0), glass(1.0, medium));
         scene.environment = constant_sky(1.0);
         scene.cameras = vec![oblique(degrees, 0.5)];
         let truth = 1.0 - (1.0 - albedo).sqrt() * h_function(albedo, degrees.to_radians().cos());
-        let paths = truth * (1.0 - truth) * (8.4 / delta as f64).powi(2);
+        let paths = truth * (1.0 - truth) * (8.4 / delta).powi(2);
         let settings = settings(32, ((paths / 1024.0) as u64).next_power_of_two());
         let Some(r) = render(&scene, &settings, Tuning::default()) else {
             return;
