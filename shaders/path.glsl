@@ -196,6 +196,7 @@ SurfacePoint path_sensor()
     s.position = params.camera_position;
     // It may lie on a surface of the scene.
     s.error = vec3(POSITION_ROUNDINGS * EPSILON) * (abs(s.position) + params.camera_right.x);
+    s.record = NONE;
     s.ng = s.ns = params.camera_forward;
     s.is_front = true;
     s.area = 0.0;

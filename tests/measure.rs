@@ -108,6 +108,114 @@ fn irradiance_of_skies_and_rooms() {
     }
 }
 
+/// The sensor is no scattering event: with one allowed, the room's light has bounced once at most.
+#[test]
+fn depth_counts_from_the_first_surface() {
+    let mut scene = empty();
+    add(&mut scene, room(1.0), emitter(0.5, 1.0));
+    let sensor = upwards(DVec3::new(0.2, 0.3, -0.1));
+    let settings = Settings {
+        sensor: Some(sensor),
+        max_depth: 1,
+        ..settings(32, 256)
+    };
+    let Some(r) = render(&scene, &settings, Tuning::default()) else {
+        return;
+    };
+    let reading = Reading::of(&r.film, &sensor, &scene).unwrap();
+    let (off, bound) = ((reading.value[0] - 1.5 * PI).abs(), 4.9 * reading.error[0]);
+    assert!(off + bound <= 5e-3 * 1.5 * PI, "{}", reading.value[0]);
+}
+
+/// In glass all radiance that gets in is n² times as large: the hemisphere above a meter under a plane face holds
+/// what is refracted, π L (1 − F) with Fresnel's mean from outside, and nothing beyond the critical angle.
+#[test]
+fn irradiance_under_glass_is_what_gets_in() {
+    let mut scene = empty();
+    let mut slab = square(Vec3::ZERO, Vec3::Y, 50.0);
+    // A wide block of glass, black below: its floor absorbs what comes down.
+    slab.name = String::from("floor");
+    for p in &mut slab.positions {
+        p.y = -1.5;
+    }
+    add(&mut scene, slab, lambert(0.0));
+    let mut block = room(1.0);
+    for p in &mut block.positions {
+        *p *= Vec3::new(50.0, 1.0, 50.0);
+        p.y -= 1.0;
+    }
+    for t in &mut block.triangles {
+        t.swap(1, 2);
+    }
+    let glass = Material {
+        metallic: 0.0,
+        roughness: 0.0,
+        transmission: 1.0,
+        volume: Some(Default::default()),
+        ..Material::default()
+    };
+    add(&mut scene, block, glass);
+    scene.environment = constant_sky(1.0);
+    let truth = PI * (1.0 - 0.091_778_0);
+    assert_reads(
+        "under glass",
+        &scene,
+        upwards(DVec3::new(0.0, -1.0, 0.0)),
+        truth,
+        2e-2,
+    );
+}
+
+/// Where the scene stands does not matter: 4e5 m away everything reads the same.
+#[test]
+fn far_away_reads_the_same() {
+    let place = DVec3::new(4e5, -2e5, 3e5);
+    let mut scene = nothing();
+    scene.lights = vec![punctual(
+        LightKind::Point,
+        DVec3::new(0.0, 2.0, 0.0),
+        Vec3::NEG_Y,
+    )];
+    let mut far = carried(scene, 1.0, place);
+    far.lights[0].position += place;
+    assert_reads("far", &far, upwards(place), 3.0 / 4.0, 1e-5);
+}
+
+/// A node brings its descendants, wherever they stand in the file, and nothing else.
+#[test]
+fn luminaire_is_a_node_with_its_descendants() {
+    let mut scene = nothing();
+    add(
+        &mut scene,
+        square(Vec3::ZERO, Vec3::Y, 0.5),
+        emitter(0.0, 2.0),
+    );
+    scene.lights = vec![punctual(LightKind::Point, DVec3::ZERO, Vec3::NEG_Y)];
+    scene.environment = constant_sky(1.0);
+    let node = |name: &str, parent, instances: &[u32], lights: &[u32]| etendue::scene::Node {
+        name: name.to_owned(),
+        parent,
+        instances: instances.to_vec(),
+        lights: lights.to_vec(),
+    };
+    scene.nodes = vec![
+        node("bulb", Some(2), &[1], &[]),
+        node("floor", None, &[0], &[]),
+        node("lamp", Some(3), &[], &[]),
+        node("ceiling", None, &[], &[0]),
+    ];
+    let counts = |name: &str| {
+        let part = scene.luminaire(scene.find_node(name).unwrap());
+        assert!(part.environment.is_none() && part.medium.is_none());
+        (part.instances.len(), part.lights.len())
+    };
+    assert_eq!(counts("bulb"), (1, 0));
+    assert_eq!(counts("lamp"), (1, 0));
+    assert_eq!(counts("ceiling"), (1, 1));
+    assert_eq!(counts("1"), (1, 0));
+    assert_eq!(scene.find_node("4"), None);
+}
+
 /// A disc-like square above the meter: the form factor of a square over its centre by quadrature.
 #[test]
 fn irradiance_below_a_square_lamp() {

@@ -1,8 +1,4 @@
 //! `etendue measure`: a light meter in a scene.
-#![allow(
-    clippy::print_stdout,
-    reason = "the reading is the data that was asked for"
-)]
 
 use etendue::render::{Control, DeviceOptions, Reading, Renderer};
 use etendue::scene::Scene;
@@ -15,7 +11,7 @@ use super::args::{MeasureArgs, numbers};
 use super::failure::{Failure, Outcome};
 use super::interrupt::Interrupt;
 use super::render::load_scene;
-use super::write_stderr;
+use super::{write_stderr, write_stdout};
 
 /// Side of the sensor's frame: its pixels are readings of the same thing, 1024 in all.
 const SIDE: u32 = 32;
@@ -93,12 +89,8 @@ pub fn run(args: &MeasureArgs) -> Result<Outcome, Failure> {
             "warning: {count} samples were not finite and count as dark"
         ));
     }
-    print(
-        args,
-        &quantity,
-        &reading,
-        film.samples() * film.pixels() as u64,
-    );
+    let samples = film.samples() * film.pixels() as u64;
+    write_stdout(&text(args, &quantity, &reading, samples))?;
     Ok(match is_interrupted {
         true => Outcome::Interrupted,
         false => Outcome::Done,
@@ -171,13 +163,14 @@ fn node(scene: &Scene, name: &'static str, asked: &str) -> Result<usize> {
     })
 }
 
-fn print(args: &MeasureArgs, quantity: &Quantity, reading: &Reading, samples: u64) {
+/// The reading as people or programs read it.
+fn text(args: &MeasureArgs, quantity: &Quantity, reading: &Reading, samples: u64) -> String {
     let unit = quantity.units[usize::from(args.wavelength.is_some())];
     // One photon has the energy h c/λ.
     let photons = args.wavelength.map(|nm| nm * 1e-9 / PLANCK_LIGHT);
     let (luminance, luminance_error) = reading.luminance();
+    let scaled = |v: [f64; 3], by: f64| v.map(|x| x * by);
     if args.json {
-        let scaled = |v: [f64; 3], by: f64| v.map(|x| x * by);
         let mut object = json!({
             "quantity": quantity.name,
             "unit": unit,
@@ -192,21 +185,21 @@ fn print(args: &MeasureArgs, quantity: &Quantity, reading: &Reading, samples: u6
             object["photon_unit"] = json!(quantity.units[2]);
             object["photons"] = json!(scaled(reading.value, per_watt));
         }
-        println!("{object}");
-        return;
+        return format!("{object}\n");
     }
-    println!(
-        "{} ({unit}), 95 % confidence, {samples} samples",
+    let mut text = format!(
+        "{} ({unit}), 95 % confidence, {samples} samples\n",
         quantity.name
     );
     let channels = ["red", "green", "blue"].into_iter();
     let lines = channels.zip(reading.value.into_iter().zip(reading.error));
     for (name, (value, error)) in lines.chain([("luminance", (luminance, luminance_error))]) {
         let rate = photons.map(|p| format!("   {:.6e} {}", value * p, quantity.units[2]));
-        println!(
-            "  {name:<10} {value:>14.7} ± {:.2e}{}",
+        text += &format!(
+            "  {name:<10} {value:>14.7} ± {:.2e}{}\n",
             CONFIDENCE_95 * error,
             rate.unwrap_or_default()
         );
     }
+    text
 }
