@@ -7,6 +7,7 @@ pub mod film;
 pub mod gpu;
 pub mod image_io;
 pub mod layout;
+mod mutant;
 pub mod render;
 pub mod scene;
 pub mod settings;

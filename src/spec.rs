@@ -198,21 +198,36 @@ fn may_pass(m: &Material) -> bool {
     }
 }
 
-macro_rules! spirv {
+/// SPIR-V of a kernel, embedded.
+#[derive(Clone, Copy)]
+pub(crate) struct Kernel {
+    name: &'static str,
+    spirv: &'static [u8],
+}
+
+impl Kernel {
+    /// The words of the module.
+    pub(crate) fn words(self) -> Vec<u32> {
+        let planted = crate::mutant::spirv(self.name);
+        bytemuck::pod_collect_to_vec(planted.as_deref().unwrap_or(self.spirv))
+    }
+}
+
+macro_rules! kernel {
     ($name:literal) => {
-        include_bytes!(concat!(env!("OUT_DIR"), "/", $name, ".spv"))
+        super::Kernel {
+            name: $name,
+            spirv: include_bytes!(concat!(env!("OUT_DIR"), "/", $name, ".spv")),
+        }
     };
 }
 
-/// SPIR-V of the kernels, one for each traversal.
+/// The kernels, one for each traversal.
 pub(crate) mod kernels {
-    pub(crate) const PATH_SOFTWARE: &[u8] = spirv!("path_software");
-    pub(crate) const PATH_QUERY: &[u8] = spirv!("path_query");
-    pub(crate) const PROBE_SOFTWARE: &[u8] = spirv!("probe_software");
-    pub(crate) const PROBE_QUERY: &[u8] = spirv!("probe_query");
-}
+    use super::Kernel;
 
-/// SPIR-V bytes as words.
-pub(crate) fn words(bytes: &[u8]) -> Vec<u32> {
-    bytemuck::pod_collect_to_vec(bytes)
+    pub(crate) const PATH_SOFTWARE: Kernel = kernel!("path_software");
+    pub(crate) const PATH_QUERY: Kernel = kernel!("path_query");
+    pub(crate) const PROBE_SOFTWARE: Kernel = kernel!("probe_software");
+    pub(crate) const PROBE_QUERY: Kernel = kernel!("probe_query");
 }

@@ -16,14 +16,15 @@ const MAY_USE: &[(&str, &[&str])] = &[
     ("gpu", &["error"]),
     ("bvh", &["error"]),
     ("settings", &["error"]),
-    ("scene", &["error"]),
+    ("mutant", &[]),
+    ("scene", &["error", "mutant"]),
     ("film", &["error", "layout", "settings"]),
     ("image_io", &["error", "film", "settings"]),
-    ("spec", &["scene", "settings"]),
+    ("spec", &["mutant", "scene", "settings"]),
     (
         "render",
         &[
-            "bvh", "error", "film", "gpu", "layout", "scene", "settings", "spec",
+            "bvh", "error", "film", "gpu", "layout", "mutant", "scene", "settings", "spec",
         ],
     ),
 ];
@@ -68,7 +69,9 @@ fn rust() -> Vec<(String, String)> {
 /// Everything that people write, without the documents.
 fn code() -> Vec<(String, String)> {
     let mut all = files(
-        &["src", "shaders", "examples", "tests", "scripts", "build.rs"],
+        &[
+            "src", "shaders", "examples", "tests", "scripts", "build", "build.rs",
+        ],
         &["rs", "glsl", "comp", "sh"],
     );
     // This file names the words that it forbids.

@@ -9,6 +9,7 @@ use std::f64::consts::PI;
 use glam::Vec3;
 
 use crate::layout;
+use crate::mutant;
 use crate::scene::{LightKind, PunctualLight};
 
 /// One emitter with the power that decides how often it is sampled.
@@ -128,6 +129,9 @@ pub(crate) fn environment_table(
 ) -> Option<(Vec<layout::EnvTexel>, f64)> {
     // Mean of a tent over a texel: 1/8, 6/8, 1/8 in each axis.
     let mean = |x: usize, y: usize| {
+        if mutant::is("environment-nearest") {
+            return sampling_weight(Vec3::from(texels[y * width + x]));
+        }
         let columns = [(x + width - 1) % width, x, (x + 1) % width];
         let rows = [y.saturating_sub(1), y, (y + 1).min(height - 1)];
         let mut sum = 0.0;

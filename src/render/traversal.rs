@@ -11,7 +11,7 @@ use crate::bvh::{Bvh, GroupDesc, InstanceDesc, Quality};
 use crate::error::Result;
 use crate::gpu::{BindingKind, Blas, BlasGeometry, Buffer, Device, Resource, Tlas, TlasInstance};
 use crate::layout;
-use crate::spec::kernels;
+use crate::spec::{Kernel, kernels};
 
 /// The own tree of a scene.
 pub(super) fn build_bvh(data: &SceneData) -> Result<Bvh> {
@@ -100,16 +100,16 @@ impl Traversal {
         }
     }
 
-    /// SPIR-V of the kernel that renders.
-    pub fn path_kernel(&self) -> &'static [u8] {
+    /// The kernel that renders.
+    pub fn path_kernel(&self) -> Kernel {
         match self {
             Self::Software { .. } => kernels::PATH_SOFTWARE,
             Self::Query { .. } => kernels::PATH_QUERY,
         }
     }
 
-    /// SPIR-V of the kernel that answers given rays.
-    pub fn probe_kernel(&self) -> &'static [u8] {
+    /// The kernel that answers given rays.
+    pub fn probe_kernel(&self) -> Kernel {
         match self {
             Self::Software { .. } => kernels::PROBE_SOFTWARE,
             Self::Query { .. } => kernels::PROBE_QUERY,

@@ -214,7 +214,7 @@ impl VulkanBackend {
             device,
             &PipelineDesc {
                 name: "path",
-                spirv: &spec::words(traversal.path_kernel()),
+                spirv: &traversal.path_kernel().words(),
                 bindings: &bindings,
                 constants: &data.spec.constants(),
                 push_bytes: size_of::<layout::Batch>() as u32,
@@ -367,7 +367,7 @@ impl VulkanBackend {
             &self.device,
             &PipelineDesc {
                 name: "probe",
-                spirv: &spec::words(self.traversal.probe_kernel()),
+                spirv: &self.traversal.probe_kernel().words(),
                 bindings: &bindings,
                 constants: &self.spec.constants(),
                 push_bytes: size_of::<layout::Batch>() as u32,

@@ -1,6 +1,6 @@
 //! Light that is seen directly.
 
-use etendue::render::Tuning;
+use etendue::render::{Control, Renderer, Tuning};
 use etendue::scene::{Material, Scene};
 use etendue::settings::{BackendChoice, Settings};
 use glam::{DVec3, Vec3};
@@ -110,4 +110,58 @@ fn constant_sky_keeps_its_value_over_a_million_samples() {
         // Twenty levels of a tree of equal numbers: each doubling is exact; one rounding at the end.
         assert!(off <= 1e-7, "{radiance}: off by {off:.1e}");
     }
+}
+
+/// Across the rim of an emitter each sample is 1 or 0: the mean p tells the standard error, √(p(1 − p)/(N − 1)).
+#[test]
+fn standard_error_is_that_of_the_samples() {
+    const SAMPLES: u64 = 256;
+    let mut scene = empty();
+    add(
+        &mut scene,
+        square(Vec3::ZERO, Vec3::Z, 0.55),
+        emitter(0.0, 1.0),
+    );
+    scene.cameras = vec![parallel(DVec3::Z, DVec3::ZERO, 1.0)];
+    let Some(r) = render(&scene, &settings(8, SAMPLES), Tuning::default()) else {
+        return;
+    };
+    let mut rim = 0;
+    for (mean, error) in r.film.mean().iter().zip(r.film.standard_error()) {
+        let p = f64::from(mean[0]);
+        let wanted = (p * (1.0 - p) / (SAMPLES - 1) as f64).sqrt();
+        let off = (f64::from(error[0]) - wanted).abs();
+        // Eight levels of a tree of squares, rounded in single precision.
+        assert!(off <= 1e-6 * wanted, "{p}: {error:?} instead of {wanted}");
+        rim += usize::from(wanted > 0.0);
+    }
+    assert!(rim >= 12, "{rim} pixels on the rim");
+}
+
+/// Two emitters at the end of fp32 are more than it holds: such samples are left out, and the report says how many.
+#[test]
+fn samples_that_overflow_are_counted() {
+    let mut scene = filled_view(10.0, 0.0, false);
+    scene.materials[0] = Material {
+        emission: Vec3::splat(f32::MAX),
+        ..lambert(1.0)
+    };
+    scene.environment = constant_sky(f32::MAX);
+    let options = etendue::render::DeviceOptions {
+        device: None,
+        validation: true,
+    };
+    let settings = settings(8, 4);
+    let mut renderer = match Renderer::tuned(&scene, &settings, &options, Tuning::default()) {
+        Ok(renderer) => renderer,
+        Err(error) if device_required() => panic!("{error}"),
+        Err(error) => return println!("skipped: {error}"),
+    };
+    let film = renderer.render(&mut |_| Control::Continue).unwrap();
+    assert_eq!(renderer.report().ledger.non_finite, 8 * 8 * 4);
+    assert!(film.mean().iter().flatten().all(|v| *v == 0.0));
+}
+
+fn device_required() -> bool {
+    std::env::var_os("ETENDUE_REQUIRE_DEVICE").is_some_and(|value| value == "1")
 }

@@ -2,7 +2,8 @@
 
 use etendue::render::Tuning;
 use etendue::scene::Mesh;
-use glam::{DVec3, Vec3};
+use etendue::settings::{Settings, Strategy};
+use glam::{DAffine3, DMat3, DVec3, Vec3};
 
 use crate::common::*;
 
@@ -84,10 +85,70 @@ fn no_light_leaks_through_walls_with_bumpy_normals() {
         "light leaks in"
     );
     // The same walls are bright from outside.
-    let outside = etendue::settings::Settings {
+    let outside = Settings {
         camera: Some(1),
         ..settings(16, 16)
     };
     let r = render(&scene, &outside, Tuning::default()).unwrap();
     assert!(r.film.mean().iter().flatten().all(|v| *v > 1.0));
+}
+
+/// A plane whose shading normal leans by θ under a white sky: of its lobe (1 + cos θ)/2 lies above the plane, and what
+/// lies below is lost, not reflected once more.
+#[test]
+fn light_below_the_surface_is_lost() {
+    let (degrees, albedo) = (40f32, 0.8);
+    let (sin, cos) = degrees.to_radians().sin_cos();
+    let mut plane = square(Vec3::ZERO, Vec3::Z, 1.0);
+    plane.normals = vec![Vec3::new(sin, 0.0, cos); plane.positions.len()];
+    let mut scene = empty();
+    add(&mut scene, plane, lambert(albedo));
+    scene.environment = constant_sky(1.0);
+    scene.cameras = vec![parallel(DVec3::Z, DVec3::ZERO, 0.5)];
+    let settings = Settings {
+        strategy: Strategy::BsdfOnly,
+        ..settings(32, 1024)
+    };
+    let Some(r) = render(&scene, &settings, Tuning::default()) else {
+        return;
+    };
+    let truth = f64::from(albedo) * 0.5 * f64::from(1.0 + cos);
+    crate::assert_mean("leaning normal", &r.film, truth, 5e-3);
+}
+
+/// A placed mesh carries its normals by the inverse transpose, whether it is copied or kept.
+#[test]
+fn stretched_meshes_keep_their_normals() {
+    // It leans so little that its mirror image of the view is above the surface: nothing bends it.
+    let given = Vec3::new(0.2, -0.2, 0.9).normalize();
+    let mut plane = square(Vec3::ZERO, Vec3::Z, 1.0);
+    plane.normals = vec![given; plane.positions.len()];
+    let turn = DMat3::from_rotation_x(0.6) * DMat3::from_rotation_y(-0.4);
+    let matrix = turn * DMat3::from_diagonal(DVec3::new(0.4, 1.5, 0.7));
+    let mut scene = empty();
+    add_at(&mut scene, plane, lambert(0.5), DAffine3::from_mat3(matrix));
+    // Kept as a group only if it is placed more than once.
+    let mut second = scene.instances[0].clone();
+    second.world_from_object.translation = turn * DVec3::new(0.0, 0.0, -5.0);
+    scene.instances.push(second);
+    scene.cameras = vec![parallel(turn * DVec3::Z, DVec3::ZERO, 0.2)];
+    let wanted = (matrix.inverse().transpose() * given.as_dvec3()).normalize();
+    for copy_limit in [0, usize::MAX] {
+        let tuning = Tuning {
+            copy_limit,
+            ..Tuning::default()
+        };
+        let settings = Settings {
+            aovs: true,
+            ..settings(8, 4)
+        };
+        let Some(r) = render(&scene, &settings, tuning) else {
+            return;
+        };
+        for n in r.film.normal().unwrap() {
+            let off = (Vec3::from(n).as_dvec3() - wanted).length();
+            // A product of a matrix with a vector and two square roots.
+            assert!(off < 1e-6, "{n:?} instead of {wanted}, limit {copy_limit}");
+        }
+    }
 }

@@ -1,8 +1,10 @@
 //! Solids that lose nothing change nothing in a white world, with and without
 //! scattering inside; an absorbing ball converges to its closed form.
 
+use std::sync::Arc;
+
 use etendue::render::Tuning;
-use etendue::scene::{Material, Medium, Mesh, Phase, Scene};
+use etendue::scene::{Environment, Material, Medium, Mesh, Phase, Scene};
 use etendue::settings::{Settings, Strategy};
 use glam::{DVec3, Vec3};
 
@@ -136,4 +138,21 @@ fn absorbing_ball_converges_to_its_closed_form() {
         offs[2] < 0.5 * offs[1] && offs[1] < 0.5 * offs[0],
         "{offs:?}"
     );
+}
+
+/// The same where the white world is a map, which direct light samples as well: both ways
+/// of finding it share the work, however the phase function differs from the map's density.
+#[test]
+fn white_fog_is_invisible_in_a_white_map() {
+    let half = Vec3::splat(0.5);
+    let fog = grey(0.0, 2.0, Phase::HenyeyGreenstein { g: 0.7 });
+    let mut scene = in_white(block(-half, half), glass(1.0, fog));
+    scene.environment = Some(Environment::Map {
+        width: 4,
+        height: 2,
+        texels: Arc::new(vec![[1.0; 3]; 8]),
+        intensity: 1.0,
+        rotation: 0.0,
+    });
+    assert_white("fog in a map", &scene, &settings(24, 512), 1e-2);
 }

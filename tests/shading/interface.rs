@@ -8,7 +8,7 @@ use crate::fixture::Rng;
 use crate::oracle::Interface;
 use crate::{BIND_INPUT, BIND_OUTPUT, Kernel, finish, groups, open};
 
-const INTERFACE: &[u8] = include_bytes!(concat!(env!("OUT_DIR"), "/test_shading_interface.spv"));
+const INTERFACE: &str = "test_shading_interface";
 
 /// Of `shaders/tests/shading_interface.comp`.
 pub const FRESNEL: u32 = 0;

@@ -30,6 +30,7 @@ mod scene;
 mod statistics;
 mod values;
 
+use std::path::PathBuf;
 use std::sync::Arc;
 
 use etendue::Error;
@@ -65,6 +66,18 @@ fn open() -> Option<Arc<Device>> {
     }
 }
 
+/// SPIR-V of a kernel; with the feature `mutants`, of the changed one that tests/mutants made of it.
+fn spirv(name: &str) -> Vec<u8> {
+    let file = format!("{name}.spv");
+    if cfg!(feature = "mutants") {
+        let folder = std::env::var_os("ETENDUE_MUTANT_SPIRV").unwrap_or_default();
+        if let Ok(planted) = std::fs::read(PathBuf::from(folder).join(&file)) {
+            return planted;
+        }
+    }
+    std::fs::read(PathBuf::from(env!("ETENDUE_SHADER_DIR")).join(&file)).unwrap()
+}
+
 /// Destroys the device and asserts that validation had nothing to say.
 fn finish(device: Arc<Device>) {
     let log = device.validation_log();
@@ -83,14 +96,14 @@ struct Kernel {
 impl Kernel {
     fn new(
         device: &Arc<Device>,
-        spirv: &[u8],
+        name: &str,
         bindings: &[(u32, BindingKind)],
         constants: &[(u32, u32)],
         push_words: u32,
     ) -> Self {
         let desc = PipelineDesc {
             name: "shading",
-            spirv: &bytemuck::pod_collect_to_vec::<u8, u32>(spirv),
+            spirv: &bytemuck::pod_collect_to_vec::<u8, u32>(&spirv(name)),
             bindings,
             constants,
             push_bytes: 4 * push_words,

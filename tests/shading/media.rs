@@ -9,7 +9,7 @@ use crate::fixture::Rng;
 use crate::statistics::FALSE_ALARM;
 use crate::{BIND_INPUT, BIND_OUTPUT, GROUP, Kernel, finish, open};
 
-const MEDIA: &[u8] = include_bytes!(concat!(env!("OUT_DIR"), "/test_shading_media.spv"));
+const MEDIA: &str = "test_shading_media";
 
 /// Of `shaders/tests/shading_media.comp`.
 const TRANSMITTANCE: u32 = 0;

@@ -6,7 +6,7 @@ use etendue::gpu::BindingKind;
 use crate::statistics::{Family, chi_square};
 use crate::{Kernel, finish, groups, open};
 
-const RANDOM: &[u8] = include_bytes!(concat!(env!("OUT_DIR"), "/test_shading_random.spv"));
+const RANDOM: &str = "test_shading_random";
 
 /// Draws of one block.
 const COUNT: usize = 1 << 20;

@@ -11,7 +11,7 @@ use crate::oracle::{Bsdf, reflected_pdf};
 use crate::statistics::{Family, chi_square};
 use crate::{BIND_CASES, BIND_COUNTS, BIND_INPUT, BIND_OUTPUT, GROUP, Kernel, finish, open};
 
-const SAMPLERS: &[u8] = include_bytes!(concat!(env!("OUT_DIR"), "/test_shading_samplers.spv"));
+const SAMPLERS: &str = "test_shading_samplers";
 
 /// Of `shaders/tests/shading_samplers.comp`.
 const COSINE: u32 = 0;

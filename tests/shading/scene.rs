@@ -8,7 +8,7 @@ use etendue::layout::{self, Params};
 
 use crate::{BIND_INPUT, BIND_OUTPUT, Kernel, groups};
 
-const SCENE: &[u8] = include_bytes!(concat!(env!("OUT_DIR"), "/test_shading_scene.spv"));
+const SCENE: &str = "test_shading_scene";
 
 /// Of `shaders/tests/shading_scene.comp`.
 pub const ENVIRONMENT: u32 = 0;

@@ -12,7 +12,7 @@ use crate::fixture::{ANGLES, Case, ROUGHNESS, Rng, coated, direction, metal, see
 use crate::oracle::{Bsdf, distribution, reflected_pdf, schlick, visibility};
 use crate::{BIND_CASES, BIND_INPUT, BIND_OUTPUT, Kernel, finish, groups, open};
 
-const VALUES: &[u8] = include_bytes!(concat!(env!("OUT_DIR"), "/test_shading_values.spv"));
+const VALUES: &str = "test_shading_values";
 
 /// Of `shaders/tests/shading_values.comp`.
 const BSDF: u32 = 0;

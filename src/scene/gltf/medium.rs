@@ -5,6 +5,7 @@ use glam::{DVec3, Vec3};
 use super::json::{self, Root};
 use super::node::scene_index;
 use super::{Check, Warnings, quote};
+use crate::mutant;
 use crate::scene::{Medium, Phase};
 
 /// ETENDUE_medium of the scene.
@@ -54,7 +55,12 @@ pub(super) fn read(given: &json::Medium, user: &str) -> Check<Medium> {
 /// dominant wavelengths of the Rec. 709 primaries.
 fn rayleigh(at_550: f64) -> DVec3 {
     const WAVELENGTHS: DVec3 = DVec3::new(611.4, 549.1, 464.2);
-    at_550 * (550.0 / WAVELENGTHS).powf(4.0)
+    let exponent = if mutant::is("rayleigh-square") {
+        2.0
+    } else {
+        4.0
+    };
+    at_550 * (550.0 / WAVELENGTHS).powf(exponent)
 }
 
 /// Without a phase, `rayleigh550` scatters as Rayleigh does and all else evenly.

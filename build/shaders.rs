@@ -1,0 +1,70 @@
+//! The table of shaders and how one of them becomes SPIR-V: for build.rs, and for
+//! tests/mutants, which compiles changed ones.
+
+/// (source, macros, output). A macro chooses which traversal or kernel is included and nothing else.
+pub const SHADERS: &[(&str, &[&str], &str)] = &[
+    ("kernel.comp", &["TRAVERSE_SOFTWARE"], "path_software"),
+    ("kernel.comp", &["TRAVERSE_QUERY"], "path_query"),
+    (
+        "kernel.comp",
+        &["TRAVERSE_SOFTWARE", "KERNEL_PROBE"],
+        "probe_software",
+    ),
+    (
+        "kernel.comp",
+        &["TRAVERSE_QUERY", "KERNEL_PROBE"],
+        "probe_query",
+    ),
+    ("tests/resources.comp", &[], "test_resources"),
+    ("tests/rays.comp", &[], "test_rays"),
+    ("tests/shading_samplers.comp", &[], "test_shading_samplers"),
+    ("tests/shading_values.comp", &[], "test_shading_values"),
+    ("tests/shading_random.comp", &[], "test_shading_random"),
+    ("tests/shading_scene.comp", &[], "test_shading_scene"),
+    (
+        "tests/shading_interface.comp",
+        &[],
+        "test_shading_interface",
+    ),
+    ("tests/shading_media.comp", &[], "test_shading_media"),
+    ("examples/needle.comp", &[], "example_needle"),
+];
+
+/// SPIR-V of one entry of the table. `read` gives the text of a file below `shaders`.
+///
+/// # Panics
+///
+/// With the compiler's message, where the shader is wrong.
+pub fn compile(
+    compiler: &shaderc::Compiler,
+    read: &dyn Fn(&str) -> Result<String, String>,
+    source: &str,
+    macros: &[&str],
+    level: shaderc::OptimizationLevel,
+) -> Vec<u8> {
+    let text = read(source).expect("the shader table names files that exist");
+    let mut options = shaderc::CompileOptions::new().expect("shaderc starts");
+    options.set_target_env(
+        shaderc::TargetEnv::Vulkan,
+        shaderc::EnvVersion::Vulkan1_2 as u32,
+    );
+    options.set_target_spirv(shaderc::SpirvVersion::V1_5);
+    options.set_optimization_level(level);
+    options.set_warnings_as_errors();
+    for name in macros {
+        options.add_macro_definition(name, None);
+    }
+    options.set_include_callback(|name, _, from, _| match read(name) {
+        Ok(content) => Ok(shaderc::ResolvedInclude {
+            resolved_name: format!("shaders/{name}"),
+            content,
+        }),
+        Err(error) => Err(format!("{name}, included from {from}: {error}")),
+    });
+    let kind = shaderc::ShaderKind::Compute;
+    let path = format!("shaders/{source}");
+    match compiler.compile_into_spirv(&text, kind, &path, "main", Some(&options)) {
+        Ok(artifact) => artifact.as_binary_u8().to_vec(),
+        Err(error) => panic!("{source} {macros:?}\n{error}"),
+    }
+}

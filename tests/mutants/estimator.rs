@@ -1,0 +1,183 @@
+//! The estimator, random numbers, sums.
+
+use crate::Mutant;
+
+pub const MUTANTS: &[Mutant] = &[
+    Mutant {
+        name: "mis-half",
+        wrong: "each of two strategies has half the weight",
+        file: "shaders/sampling.glsl",
+        edits: &[(
+            "    return 1.0 / (1.0 + ratio * ratio);",
+            "    return 0.5 + 0.0 * ratio;",
+        )],
+        killers: &["shading::values::mis_weights_sum_to_one"],
+    },
+    Mutant {
+        name: "mis-sum",
+        wrong: "the weights of two strategies do not sum to one",
+        file: "shaders/direct.glsl",
+        edits: &[(
+            "STRATEGY_LIGHT_ONLY ? 0.0 : mis_weight(pdf_bsdf, pdf_light);",
+            "STRATEGY_LIGHT_ONLY ? 0.0 : 1.0;",
+        )],
+        killers: &["integrator::closed::closed_room_sums_the_series"],
+    },
+    Mutant {
+        name: "mis-delta",
+        wrong: "light without extent shares its weight with scattering",
+        file: "shaders/direct.glsl",
+        edits: &[(
+            "if (is_delta || STRATEGY == STRATEGY_LIGHT_ONLY) {",
+            "if (STRATEGY == STRATEGY_LIGHT_ONLY) {",
+        )],
+        killers: &[
+            "integrator::punctual::directional_light_obeys_the_cosine_and_ends_at_the_horizon",
+        ],
+    },
+    Mutant {
+        name: "mirror-shared",
+        wrong: "what a mirror shows shares its weight with direct light",
+        file: "shaders/path.glsl",
+        edits: &[(
+            "path.can_be_sampled = next.pdf > 0.0;",
+            "path.can_be_sampled = true;",
+        )],
+        killers: &["matter::slab::thin_sheet_is_a_plate_without_absorption"],
+    },
+    Mutant {
+        name: "roulette-weight",
+        wrong: "survivors of roulette are not weighted",
+        file: "shaders/path.glsl",
+        edits: &[("    path.beta /= survival;", "    path.beta *= 1.0;")],
+        killers: &["integrator::closed::closed_room_sums_the_series"],
+    },
+    Mutant {
+        name: "roulette-square",
+        wrong: "survival is the square of the throughput",
+        file: "shaders/path.glsl",
+        edits: &[(
+            "min(max_component(path.beta), 1.0) : 1.0;",
+            "square(min(max_component(path.beta), 1.0)) : 1.0;",
+        )],
+        killers: &["integrator::closed::closed_room_sums_the_series"],
+    },
+    Mutant {
+        name: "depth-eight",
+        wrong: "paths end after eight scatterings",
+        file: "shaders/path.glsl",
+        edits: &[(
+            "    bool is_last = path.depth >= params.max_depth;\n    if (is_last && !bsdf_is_straight(bsdf)) {",
+            "    bool is_last = path.depth >= min(params.max_depth, 8u);\n    if (is_last && !bsdf_is_straight(bsdf)) {",
+        )],
+        killers: &["integrator::closed::closed_room_sums_the_series"],
+    },
+    Mutant {
+        name: "clamp-ten",
+        wrong: "bright samples are cut at 10",
+        file: "shaders/kernel_path.glsl",
+        edits: &[(
+            "vec3(0.0) : path.radiance, vec3(0.0)",
+            "vec3(0.0) : min(path.radiance, vec3(10.0)), vec3(0.0)",
+        )],
+        killers: &["integrator::closed::closed_room_sums_the_series"],
+    },
+    Mutant {
+        name: "silent-drop",
+        wrong: "samples that are not finite vanish uncounted",
+        file: "shaders/kernel_path.glsl",
+        edits: &[("non_finite += is_dropped ? 1u : 0u;", "non_finite += 0u;")],
+        killers: &["integrator::emission::samples_that_overflow_are_counted"],
+    },
+    Mutant {
+        name: "silent-cut",
+        wrong: "what the depth limit cuts off is not counted",
+        file: "shaders/kernel_path.glsl",
+        edits: &[(
+            "truncated += path.truncated > 0.0 ? 1u : 0u;",
+            "truncated += 0u;",
+        )],
+        killers: &["integrator::closed::closed_room_sums_the_series"],
+    },
+    Mutant {
+        name: "filter-weights",
+        wrong: "weights of the pixel filter are not divided out",
+        file: "shaders/kernel_path.glsl",
+        edits: &[(
+            "vec3(0.0) : path.radiance, vec3(0.0)",
+            "vec3(0.0) : path.radiance * 2.0 * rng_uniform(key, 0u, SLOT_CAMERA).x, vec3(0.0)",
+        )],
+        killers: &["integrator::emission::radiance_of_an_emitter_is_the_same_from_everywhere"],
+    },
+    Mutant {
+        name: "sum-half",
+        wrong: "sums in half precision",
+        file: "shaders/film.glsl",
+        edits: &[(
+            "precise vec3 sum = a.sum + b.sum;",
+            "vec3 exact = a.sum + b.sum;\n    vec3 sum = vec3(unpackHalf2x16(packHalf2x16(exact.xy)), unpackHalf2x16(packHalf2x16(exact.zz)).x);",
+        )],
+        killers: &["integrator::emission::constant_sky_keeps_its_value_over_a_million_samples"],
+    },
+    Mutant {
+        name: "sum-variance",
+        wrong: "the deviations of two halves leave out their difference",
+        file: "shaders/film.glsl",
+        edits: &[(
+            "precise vec3 m2 = (a.m2 + b.m2) + (d * d) * (1.0 / (2.0 * count));",
+            "precise vec3 m2 = (a.m2 + b.m2) + 0.0 * d * count;",
+        )],
+        killers: &["integrator::emission::standard_error_is_that_of_the_samples"],
+    },
+    Mutant {
+        name: "sample-zero-twice",
+        wrong: "the first sample is counted twice and the second never",
+        file: "shaders/kernel_path.glsl",
+        edits: &[(
+            "batch.first_sample_low + i, batch.first_sample_high);",
+            "batch.first_sample_low + (i == 1u ? 0u : i), batch.first_sample_high);",
+        )],
+        killers: &[
+            "integrator::determinism::same_seed_gives_the_same_bits_however_the_work_is_cut",
+        ],
+    },
+    Mutant {
+        name: "shard-seed",
+        wrong: "every pass and every shard draws the same numbers",
+        file: "shaders/kernel_path.glsl",
+        edits: &[(
+            "batch.first_sample_low + i, batch.first_sample_high);",
+            "i, batch.first_sample_high);",
+        )],
+        killers: &[
+            "integrator::determinism::same_seed_gives_the_same_bits_however_the_work_is_cut",
+        ],
+    },
+    Mutant {
+        name: "interval-closed",
+        wrong: "random numbers may be 0 and 1",
+        file: "shaders/rng.glsl",
+        edits: &[(
+            "return (vec4(bits >> 9u) + 0.5) * (1.0 / 8388608.0);",
+            "return vec4(bits) * (1.0 / 4294967295.0);",
+        )],
+        killers: &["shading::random::numbers_are_uniform_and_inside"],
+    },
+    Mutant {
+        name: "pixels-alike",
+        wrong: "all pixels draw the same numbers",
+        file: "shaders/rng.glsl",
+        edits: &[(
+            "uvec4(pixel, sample_low, 0u, 0u)",
+            "uvec4(0u, sample_low, 0u, 0u)",
+        )],
+        killers: &["shading::random::no_pixel_sample_shares_its_key"],
+    },
+    Mutant {
+        name: "slots-alike",
+        wrong: "light and scattering draw the same numbers",
+        file: "shaders/rng.glsl",
+        edits: &[("event * SLOT_COUNT + slot", "event * SLOT_COUNT")],
+        killers: &["shading::random::dimensions_pixels_samples_and_seeds_are_independent"],
+    },
+];
