@@ -13,7 +13,7 @@ fn only_what_lies_in_one_plane_is_flat() {
     assert!(is_flat(o) && is_flat(p(0.0, 1.0, 2.0)));
     // A fold, the least of folds, and a plane that is not believed: its volume would be rounded.
     assert!(!is_flat(p(0.0, 1.0, -2.0)));
-    assert!(!is_flat(p(0.0, 1.0, 2.0f32.next_up())));
+    assert!(!is_flat(p(0.0, 1.0, f32::from_bits(2.0f32.to_bits() + 1))));
     assert!(!is_flat(p(1e-20, 1.0, 2.0)));
     // Across an axis everything is.
     assert!(super::pairs::is_flat(

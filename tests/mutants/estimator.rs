@@ -67,8 +67,8 @@ pub const MUTANTS: &[Mutant] = &[
         wrong: "paths end after eight scatterings",
         file: "shaders/path.glsl",
         edits: &[(
-            "    bool is_last = path.depth >= params.max_depth;\n    if (is_last && !bsdf_is_straight(bsdf)) {",
-            "    bool is_last = path.depth >= min(params.max_depth, 8u);\n    if (is_last && !bsdf_is_straight(bsdf)) {",
+            "bool is_last = !path.is_sensor && path.depth >= params.max_depth;",
+            "bool is_last = !path.is_sensor && path.depth >= min(params.max_depth, 8u);",
         )],
         killers: &["integrator::closed::closed_room_sums_the_series"],
     },

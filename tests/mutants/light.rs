@@ -192,7 +192,7 @@ pub const MUTANTS: &[Mutant] = &[
             "return p + unit_side * dot(abs(unit_side), error);",
             "return p;",
         )],
-        killers: &["integrator::furnace::lambert_sphere_vanishes_in_the_furnace"],
+        killers: &["traversal::furnace::convex_solids_do_not_meet_themselves"],
     },
     Mutant {
         name: "offset-huge",
@@ -202,7 +202,7 @@ pub const MUTANTS: &[Mutant] = &[
             "return p + unit_side * dot(abs(unit_side), error);",
             "return p + 1.0e4 * unit_side * dot(abs(unit_side), error);",
         )],
-        killers: &["traversal::gap::plates_cast_shadows_through_thin_gaps"],
+        killers: &["traversal::gap::inside_of_the_gap_is_dark"],
     },
     Mutant {
         name: "offset-small",
@@ -333,7 +333,7 @@ pub const MUTANTS: &[Mutant] = &[
         name: "pixel-centre",
         wrong: "all rays of a pixel go through its middle",
         file: "shaders/camera.glsl",
-        edits: &[("(vec2(pixel) + u)", "(vec2(pixel) + 0.5)")],
+        edits: &[("(vec2(pixel) + u.xy)", "(vec2(pixel) + 0.5)")],
         killers: &["shading::lookups::camera_rays_go_through_their_pixels"],
     },
 ];

@@ -99,7 +99,7 @@ pub const MUTANTS: &[Mutant] = &[
             "IOR_INFINITE : after / before;",
             "IOR_INFINITE : before / after;",
         )],
-        killers: &["matter::cube::glass_cube_may_have_any_size_and_place"],
+        killers: &["matter::gradient::face_of_a_block_shows_the_refracted_sky"],
     },
     Mutant {
         name: "thin-single-face",
