@@ -46,7 +46,7 @@ fn lambert_sphere_vanishes_in_the_furnace() {
                 let seen: f32 = r.film.coverage().unwrap().iter().sum();
                 println!("{view}, × {scale}, + {offset}, {backend:?}: off {off:.1e}");
                 assert!(seen > 40.0, "the sphere is not in view");
-                // A path is 1 to the bit; one that met the body that it left would be 0.
+                // A path is 1 to the bit. One that met the body that it left would be as well: traversal::furnace finds those.
                 assert!(
                     off <= 1e-6,
                     "{view}, × {scale}, + {offset}, {backend:?}: {off}"
