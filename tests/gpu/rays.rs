@@ -14,6 +14,7 @@ const RAYS: &[u8] = include_bytes!(concat!(env!("OUT_DIR"), "/test_rays.spv"));
 
 /// Constant of `spec.glsl` that switches candidates on.
 const HAS_ALPHA: u32 = 1;
+const HAS_NESTED: u32 = 13;
 
 /// Two triangles a group, one behind the other: z = 0 and z = -1, seen from +z.
 /// Vertices have the renderer's stride of 32 bytes.
@@ -53,7 +54,7 @@ fn trace(device: &Arc<Device>, scene: &Tlas, alpha: bool, rays: &[ProbeRay]) -> 
                 (BIND_PROBE_RAYS, BindingKind::Storage),
                 (BIND_PROBE_HITS, BindingKind::Storage),
             ],
-            constants: &[(HAS_ALPHA, alpha.into())],
+            constants: &[(HAS_ALPHA, alpha.into()), (HAS_NESTED, 0)],
             push_bytes: 4,
         },
     )
