@@ -8,6 +8,7 @@
 #define DIRECT_GLSL
 
 #include "bsdf.glsl"
+#include "camera.glsl"
 #include "interior.glsl"
 #include "lights.glsl"
 #include "medium.glsl"

@@ -8,7 +8,6 @@
 #ifndef INTERIOR_GLSL
 #define INTERIOR_GLSL
 
-#include "camera.glsl"
 #include "dielectric.glsl"
 #include "surface.glsl"
 
@@ -101,15 +100,6 @@ Interior interior_cross(Interior i, uvec2 solid, bool is_entered)
     return i;
 }
 
-// A ray that meets a plane at s once more from just before it, so that it sees what else lies there.
-Ray interior_again(SurfacePoint s, vec3 d, out float t_max)
-{
-    vec3 origin = offset_origin(s.position, s.error, s.ng);
-    // Twice the way to the plane; where the ray only grazes it, faces count as apart.
-    t_max = 2.0 * distance(origin, s.position) / max(-dot(s.ng, d), 0.01);
-    return Ray(origin, d);
-}
-
 // The boundary of the solid at s for a ray along d, together with those that coincide
 // with it: between touching solids there is no gap.
 Boundary interior_boundary(Interior here, Hit hit, SurfacePoint s, vec3 d, inout uint rays)
@@ -125,12 +115,14 @@ Boundary interior_boundary(Interior here, Hit hit, SurfacePoint s, vec3 d, inout
     }
     b.before = here.current;
     b.beyond = interior_cross(here, uvec2(s.material, hit.instance), s.is_front);
-    float t_max;
-    Ray again = interior_again(s, d, t_max);
+    // The plane is met once more from just before it, to see what else lies there: twice the way
+    // to it; where the ray only grazes it, faces count as apart.
+    vec3 origin = offset_origin(s.position, s.error, s.ng);
+    float t_max = 2.0 * distance(origin, s.position) / max(-dot(s.ng, d), 0.01);
     for (uint k = 0u; k < INTERIOR_SIZE; k++) {
         surface_skip = uvec2(hit.instance, hit.primitive);
         rays++;
-        if (!trace_closest(again.origin, d, 0.0, t_max, NONE, hit)) {
+        if (!trace_closest(origin, d, 0.0, t_max, NONE, hit)) {
             break;
         }
         SurfaceSide other = surface_side(hit, d);

@@ -192,27 +192,11 @@ PathState path_start(Ray ray)
 // The white Lambert surface of a light meter: what leaves it is the irradiance over π.
 SurfacePoint path_sensor()
 {
-    SurfacePoint s;
+    SurfacePoint s = surface_white();
     s.position = params.camera_position;
     // It may lie on a surface of the scene.
     s.error = vec3(POSITION_ROUNDINGS * EPSILON) * (abs(s.position) + params.camera_right.x);
-    s.record = NONE;
     s.ng = s.ns = params.camera_forward;
-    s.is_front = true;
-    s.area = 0.0;
-    s.alpha = 1.0;
-    s.emission = vec3(0.0);
-    s.emission_pdf = 0.0;
-    s.base_color = vec3(1.0);
-    s.metallic = 0.0;
-    s.roughness = 1.0;
-    s.dielectric_f0 = vec3(0.0);
-    s.dielectric_f90 = 0.0;
-    s.material = NONE;
-    s.is_solid = false;
-    s.transmission = 0.0;
-    s.ior = 1.0;
-    s.strength = vec3(1.0);
     return s;
 }
 

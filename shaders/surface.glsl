@@ -260,6 +260,29 @@ SurfaceSide surface_side(Hit hit, vec3 d)
     return side;
 }
 
+// A white Lambert surface, without its place.
+SurfacePoint surface_white()
+{
+    SurfacePoint s;
+    s.record = NONE;
+    s.is_front = true;
+    s.area = 0.0;
+    s.alpha = 1.0;
+    s.emission = vec3(0.0);
+    s.emission_pdf = 0.0;
+    s.base_color = vec3(1.0);
+    s.metallic = 0.0;
+    s.roughness = 1.0;
+    s.dielectric_f0 = vec3(0.0);
+    s.dielectric_f90 = 0.0;
+    s.material = NONE;
+    s.is_solid = false;
+    s.transmission = 0.0;
+    s.ior = 1.0;
+    s.strength = vec3(1.0);
+    return s;
+}
+
 // Everything about the point that a ray from direction −wo met.
 SurfacePoint surface_point(Hit hit, vec3 wo)
 {
@@ -267,7 +290,7 @@ SurfacePoint surface_point(Hit hit, vec3 wo)
     TriangleShape shape = surface_shape(hit.instance, triangle);
     Material material = scene_material(triangle.w & TRIANGLE_MATERIAL_MASK);
 
-    SurfacePoint s;
+    SurfacePoint s = surface_white();
     // Edge form: it stays in the plane to two roundings, unlike a + b + c weighted.
     s.position = shape.v0 + hit.bary.x * shape.e1 + hit.bary.y * shape.e2;
     s.error = shape.error;
@@ -298,21 +321,10 @@ SurfacePoint surface_point(Hit hit, vec3 wo)
     vec4 base_color = surface_base_color(material, triangle, hit.bary);
     s.base_color = base_color.rgb;
     s.alpha = HAS_BLEND && (material.flags & MATERIAL_BLEND) != 0u ? clamp(base_color.a, 0.0, 1.0) : 1.0;
-    s.emission = vec3(0.0);
-    s.emission_pdf = 0.0;
     if (HAS_AREA_LIGHTS && (material.flags & MATERIAL_EMISSIVE) != 0u && (s.is_front || (material.flags & MATERIAL_DOUBLE_SIDED) != 0u)) {
         s.emission = surface_emission(material, triangle, hit.bary);
         s.emission_pdf = material.emission_pdf;
     }
-    s.metallic = 0.0;
-    s.roughness = 1.0;
-    s.dielectric_f0 = vec3(0.0);
-    s.dielectric_f90 = 0.0;
-    s.material = NONE;
-    s.is_solid = false;
-    s.transmission = 0.0;
-    s.ior = 1.0;
-    s.strength = vec3(1.0);
     if (HAS_SPECULAR) {
         vec4 factors = surface_texture(material, TEXTURE_METALLIC_ROUGHNESS, triangle, hit.bary);
         s.roughness = material.roughness * factors.g;
