@@ -33,6 +33,15 @@ void ledger_add(uint low, uint amount)
     }
 }
 
+// The path of sample i of the batch.
+PathState kernel_start(uint i, uvec2 pixel)
+{
+    // Batches are aligned, so the low word does not overflow within one.
+    uvec4 key = rng_key(uvec2(params.seed_low, params.seed_high), pixel.y * params.width + pixel.x,
+                        batch.first_sample_low + i, batch.first_sample_high);
+    return path_start(key, pixel);
+}
+
 void main()
 {
     uint tile = kernel_tile(gl_WorkGroupID.x);
@@ -44,26 +53,31 @@ void main()
         return;
     }
     uvec2 pixel = uvec2(params.window_x, params.window_y) + at;
-    uint pixel_index = pixel.y * params.width + pixel.x;
-    uvec2 seed = uvec2(params.seed_low, params.seed_high);
-
     FilmNode levels[FILM_LEVELS];
     uint rays = 0u;
     uint truncated = 0u;
     float truncated_throughput = 0.0;
     uint non_finite = 0u;
-    for (uint i = 0u; i < batch.sample_count; i++) {
-        // Batches are aligned, so the low word does not overflow within one.
-        uvec4 key = rng_key(seed, pixel_index, batch.first_sample_low + i, batch.first_sample_high);
-        PathResult path = path_trace(key, pixel);
-        rays += path.rays;
-        truncated += path.truncated > 0.0 ? 1u : 0u;
-        truncated_throughput += path.truncated;
-        bool is_dropped = !is_finite(path.radiance);
+    PathState path = kernel_start(0u, pixel);
+    PathResult result = path_result();
+    // A lane whose path has ended starts its next sample at once, or waits for its subgroup: the
+    // bits are the same, the host measures which is faster.
+    for (uint i = 0u; i < batch.sample_count;) {
+        if (path_goes_on(path)) {
+            path_step(path, result);
+        }
+        bool goes_on = path_goes_on(path);
+        if (batch.is_together != 0u ? subgroupAny(goes_on) : goes_on) {
+            continue;
+        }
+        rays += result.rays;
+        truncated += result.truncated > 0.0 ? 1u : 0u;
+        truncated_throughput += result.truncated;
+        bool is_dropped = !is_finite(result.radiance);
         non_finite += is_dropped ? 1u : 0u;
 
-        FilmNode node = FilmNode(is_dropped ? vec3(0.0) : path.radiance, vec3(0.0), path.first.albedo, path.first.normal,
-                                 path.first.depth, path.first.coverage);
+        FilmNode node = FilmNode(is_dropped ? vec3(0.0) : result.radiance, vec3(0.0), result.first.albedo, result.first.normal,
+                                 result.first.depth, result.first.coverage);
         // A binary counter: each set bit of i is a finished sibling. The bounds
         // are constant so that the levels stay in registers.
         for (uint level = 0u; level < FILM_LEVELS; level++) {
@@ -73,6 +87,9 @@ void main()
             }
             node = film_merge(levels[level], node, float(1u << level));
         }
+        i++;
+        path = kernel_start(i, pixel);
+        result = path_result();
     }
     FilmNode root = levels[0];
     for (uint level = 1u; level < FILM_LEVELS; level++) {

@@ -55,6 +55,7 @@ struct Batch {
     uint tile_count;
     uint interleave;         // tiles are dealt out to this many workers
     uint film_first_pixel;   // the film buffer starts at this pixel of the window
+    uint is_together;        // 1: the lanes of a subgroup start their samples together
 };
 
 // --- Geometry ----------------------------------------------------------------

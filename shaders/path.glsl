@@ -43,6 +43,8 @@ struct PathResult {
 
 // A path on its way.
 struct PathState {
+    uvec4 key;             // of its random numbers
+    uint event;            // how many things the path itself has met
     Ray ray;
     uint from;             // record of the hit that the ray leaves, or NONE
     float lead;            // metres along the ray that it starts ahead of the point that it leaves
@@ -58,6 +60,10 @@ struct PathState {
     Flight flight;         // that led to the last scattering in a medium
     bool is_alive;
     bool is_sensor;        // at the surface of a light meter, which is no event
+    // With HAS_INSIDE: the search for the solids that hold the camera comes first.
+    bool is_search;
+    InteriorSearch search;
+    Ray camera;            // the ray of the path when the search is over
     // With HAS_PASSAGE: direct light that is on its way, and more that waits for it.
     Shadow shadow;
     Shadow next_shadow;
@@ -107,7 +113,7 @@ void path_light(inout PathState path, inout PathResult result, Interior interior
 }
 
 // Scattering in a medium, or its absence, over `end` metres from the point that the path left. True when the path scattered there.
-bool path_scatter(inout PathState path, inout PathResult result, uvec4 key, uint event, float end)
+bool path_scatter(inout PathState path, inout PathResult result, float end)
 {
     Medium medium = scene_medium(path.interior.current);
     if (!HAS_SCATTERING || !medium_scatters(medium)) {
@@ -116,11 +122,11 @@ bool path_scatter(inout PathState path, inout PathResult result, uvec4 key, uint
         return false;
     }
     bool is_last = path.depth >= params.max_depth;
-    vec4 u = rng_uniform(key, event, SLOT_MEDIUM);
+    vec4 u = rng_uniform(path.key, path.event, SLOT_MEDIUM);
     vec3 d = path.ray.direction;
     Flight flight = Flight(path.ray.origin - path.lead * d, d, end, medium_channels(path.beta), 0.0, 0.0);
     if (HAS_EQUIANGULAR && !is_last) {
-        DirectLight direct = direct_along(medium, flight, rng_uniform(key, event, SLOT_SEGMENT), u.z);
+        DirectLight direct = direct_along(medium, flight, rng_uniform(path.key, path.event, SLOT_SEGMENT), u.z);
         path_light(path, result, path.interior, direct.at, NONE, direct.light, path.scale * path.beta * direct.value);
     }
     MediumSample s = medium_sample(medium, path.beta, end, u.xy);
@@ -137,11 +143,11 @@ bool path_scatter(inout PathState path, inout PathResult result, uvec4 key, uint
     flight.pdf = medium_pdf(medium, flight.channels, s.distance);
     vec3 at = flight.origin + s.distance * d;
     if (HAS_LIGHTS) {
-        DirectLight direct = direct_in_medium(medium, flight, rng_uniform(key, event, SLOT_LIGHT));
+        DirectLight direct = direct_in_medium(medium, flight, rng_uniform(path.key, path.event, SLOT_LIGHT));
         path_light(path, result, path.interior, at, NONE, direct.light, path.scale * path.beta * direct.value);
     }
 
-    u = rng_uniform(key, event, SLOT_BSDF);
+    u = rng_uniform(path.key, path.event, SLOT_BSDF);
     path.ray = Ray(at, phase_sample(medium, d, u.yz));
     path.from = NONE;
     path.lead = 0.0;
@@ -167,9 +173,13 @@ float path_found_weight(PathState path, float pdf_light, vec3 point, bool is_inf
     return direct_bsdf_weight(path.pdf, pdf_light);
 }
 
-PathState path_start(Ray ray)
+// Starts the path of one sample at the camera.
+PathState path_start(uvec4 key, uvec2 pixel)
 {
+    Ray ray = camera_ray(pixel, rng_uniform(key, 0u, SLOT_CAMERA));
     PathState path;
+    path.key = key;
+    path.event = 0u;
     path.ray = ray;
     path.from = NONE;
     path.lead = 0.0;
@@ -185,6 +195,9 @@ PathState path_start(Ray ray)
     path.flight = flight_none();
     path.is_alive = true;
     path.is_sensor = HAS_SENSOR && params.camera_kind == CAMERA_IRRADIANCE;
+    path.is_search = HAS_INSIDE;
+    path.search = interior_search();
+    path.camera = ray;
     path.shadow = path.next_shadow = shadow_none();
     return path;
 }
@@ -201,11 +214,12 @@ SurfacePoint path_sensor()
 }
 
 // Starts the path in the solids that hold the camera.
-void path_enter(inout PathState path, Ray camera, Interior holds)
+void path_enter(inout PathState path)
 {
-    path.ray = camera;
-    path.interior = holds;
-    path.camera_ior = interior_ior(holds.current);
+    path.is_search = false;
+    path.ray = path.camera;
+    path.interior = path.search.holds;
+    path.camera_ior = interior_ior(path.interior.current);
 }
 
 // A shadow ray arrived, or met s, through which the fraction `through` of the light passes.
@@ -230,14 +244,14 @@ void path_shadow(inout PathState path, inout PathResult result, bool is_hit, Sur
 }
 
 // What the path does at the surface s: emission, direct light, scattering.
-void path_surface(inout PathState path, inout PathResult result, uvec4 key, uint event, SurfacePoint s, bool is_solid,
-                  Boundary boundary, mat3 frame, Bsdf bsdf)
+void path_surface(inout PathState path, inout PathResult result, SurfacePoint s, bool is_solid, Boundary boundary, mat3 frame,
+                  Bsdf bsdf)
 {
     vec3 wo = -path.ray.direction;
     vec3 wo_local = wo * frame;
     vec3 far_side = offset_origin(s.position, s.error, -s.ng);
     // A surface that covers a part of the light lets the rest pass straight on.
-    bool is_passed = HAS_BLEND && s.alpha < 1.0 && rng_uniform(key, event, SLOT_COVER).x >= s.alpha;
+    bool is_passed = HAS_BLEND && s.alpha < 1.0 && rng_uniform(path.key, path.event, SLOT_COVER).x >= s.alpha;
     if (!is_passed) {
         if (HAS_AOVS && path.depth == 0u) {
             result.first = FirstHit(s.base_color, s.ns, distance(s.position, path.scattered_at), 1.0);
@@ -264,7 +278,7 @@ void path_surface(inout PathState path, inout PathResult result, uvec4 key, uint
     }
     // Direct light. A mirror has no density that a light's sample could meet.
     if (HAS_LIGHTS && !is_last && bsdf_has_density(bsdf)) {
-        LightSample light = light_sample(s.position, rng_uniform(key, event, SLOT_LIGHT));
+        LightSample light = light_sample(s.position, rng_uniform(path.key, path.event, SLOT_LIGHT));
         float side = dot(light.wi, s.ng);
         bool is_beyond = bsdf_transmits_widely(bsdf) && side < 0.0;
         if (light.pdf > 0.0 && (side > 0.0 || is_beyond)) {
@@ -282,7 +296,7 @@ void path_surface(inout PathState path, inout PathResult result, uvec4 key, uint
         }
     }
 
-    vec4 u = rng_uniform(key, event, SLOT_BSDF);
+    vec4 u = rng_uniform(path.key, path.event, SLOT_BSDF);
     BsdfSample next = bsdf_sample(bsdf, wo_local, u.xyz);
     if (!next.is_valid) {
         path.is_alive = false;
@@ -320,117 +334,113 @@ void path_surface(inout PathState path, inout PathResult result, uvec4 key, uint
     path.flight.pdf = 0.0;
 }
 
-PathResult path_trace(uvec4 key, uvec2 pixel)
+PathResult path_result()
 {
     PathResult result;
     result.radiance = vec3(0.0);
     result.first = FirstHit(vec3(0.0), vec3(0.0), 0.0, 0.0);
     result.truncated = 0.0;
     result.rays = 0u;
+    return result;
+}
 
-    Ray camera = camera_ray(pixel, rng_uniform(key, 0u, SLOT_CAMERA));
-    PathState path = path_start(camera);
-    bool is_search = HAS_INSIDE;
-    InteriorSearch search = interior_search();
-
-    // `event` counts everything that the path itself meets. One ray is traced at a time,
-    // of the path, of direct light or of the search for solids that hold the camera,
-    // so that the code that meets surfaces is there once.
-    for (uint event = 0u;;) {
-        bool is_shadow = HAS_PASSAGE && path.shadow.is_waiting;
-        if (!is_shadow && !path.is_alive) {
-            break;
-        }
-        Ray ray = path.ray;
-        float t_max = T_FAR;
-        uint from = path.from;
-        float lead = path.lead;
+// Traces one ray of the path, of direct light or of the search for solids that hold
+// the camera, so that the code that meets surfaces is there once.
+void path_step(inout PathState path, inout PathResult result)
+{
+    bool is_shadow = HAS_PASSAGE && path.shadow.is_waiting;
+    Ray ray = path.ray;
+    float t_max = T_FAR;
+    uint from = path.from;
+    float lead = path.lead;
+    if (is_shadow) {
+        ray = path.shadow.ray;
+        t_max = path.shadow.t_max;
+        from = path.shadow.from;
+        lead = path.shadow.lead;
+    } else if (!path.is_search) {
+        path.event++;
+    }
+    if (HAS_INSIDE && HAS_NESTED) {
+        surface_skip = path.is_search ? path.search.last : uvec2(NONE);
+    }
+    Hit hit;
+    bool is_sensor = path.is_sensor && !is_shadow && !path.is_search;
+    bool is_hit = is_sensor;
+    if (!is_sensor && t_max > 0.0) {
+        result.rays++;
+        is_hit = trace_closest(ray.origin, ray.direction, 0.0, t_max, from, hit);
+    }
+    if (HAS_MEDIA && !path.is_search && !is_sensor) {
+        float end = max((is_hit ? hit.t : t_max) + lead, 0.0);
         if (is_shadow) {
-            ray = path.shadow.ray;
-            t_max = path.shadow.t_max;
-            from = path.shadow.from;
-            lead = path.shadow.lead;
-        } else if (!is_search) {
-            event++;
-        }
-        if (HAS_INSIDE && HAS_NESTED) {
-            surface_skip = is_search ? search.last : uvec2(NONE);
-        }
-        Hit hit;
-        bool is_sensor = path.is_sensor && !is_shadow && !is_search;
-        bool is_hit = is_sensor;
-        if (!is_sensor && t_max > 0.0) {
-            result.rays++;
-            is_hit = trace_closest(ray.origin, ray.direction, 0.0, t_max, from, hit);
-        }
-        if (HAS_MEDIA && !is_search && !is_sensor) {
-            float end = max((is_hit ? hit.t : t_max) + lead, 0.0);
-            if (is_shadow) {
-                path.shadow.value *= medium_transmittance(scene_medium(path.shadow.interior.current), end);
-            } else if (path_scatter(path, result, key, event, end) || !path.is_alive) {
-                continue;
-            }
-        }
-        if (!is_hit && !is_shadow) {
-            if (is_search) {
-                is_search = false;
-                path_enter(path, camera, search.holds);
-                continue;
-            }
-            float pdf_light;
-            vec3 radiance = environment_radiance(ray.direction, pdf_light);
-            result.radiance += path_found_weight(path, pdf_light, vec3(0.0), true) * path.scale * path.beta * radiance;
-            path.is_alive = false;
-            continue;
-        }
-
-        SurfacePoint s;
-        Boundary boundary;
-        boundary.beyond = is_shadow ? path.shadow.interior : path.interior;
-        bool is_solid = false;
-        mat3 frame;
-        Bsdf bsdf;
-        vec3 through = vec3(0.0);
-        if (is_hit) {
-            if (is_sensor) {
-                s = path_sensor();
-            } else {
-                s = surface_point(hit, -ray.direction);
-            }
-            if (is_search) {
-                bool is_found;
-                path.ray.origin = interior_note(search, hit, s, is_found);
-                if (is_found) {
-                    is_search = false;
-                    path_enter(path, camera, search.holds);
-                }
-                continue;
-            }
-            is_solid = HAS_DIELECTRIC && s.is_solid;
-            float eta = s.ior;
-            if (is_solid) {
-                boundary = interior_boundary(boundary.beyond, hit, s, ray.direction, result.rays);
-                eta = interior_eta(boundary);
-            }
-            vec3 normal = s.ns;
-            if (HAS_DIELECTRIC && HAS_NORMALS && s.transmission > 0.0) {
-                normal = bsdf_interface_normal(s, -ray.direction, eta);
-            }
-            frame = frame_from_z(normal);
-            float cosine = -dot(ray.direction, normal);
-            bsdf = bsdf_of(s, cosine, eta);
-            if (is_shadow) {
-                bool is_passed = is_solid && boundary.before == boundary.after;
-                through = is_passed ? vec3(1.0) : 1.0 - s.alpha + s.alpha * bsdf_straight(bsdf, cosine);
-            }
-        }
-        if (is_shadow) {
-            path_shadow(path, result, is_hit, s, through, boundary.beyond);
-        } else {
-            path_surface(path, result, key, event, s, is_solid, boundary, frame, bsdf);
+            path.shadow.value *= medium_transmittance(scene_medium(path.shadow.interior.current), end);
+        } else if (path_scatter(path, result, end) || !path.is_alive) {
+            return;
         }
     }
-    return result;
+    if (!is_hit && !is_shadow) {
+        if (path.is_search) {
+            path_enter(path);
+            return;
+        }
+        float pdf_light;
+        vec3 radiance = environment_radiance(ray.direction, pdf_light);
+        result.radiance += path_found_weight(path, pdf_light, vec3(0.0), true) * path.scale * path.beta * radiance;
+        path.is_alive = false;
+        return;
+    }
+
+    SurfacePoint s;
+    Boundary boundary;
+    boundary.beyond = is_shadow ? path.shadow.interior : path.interior;
+    bool is_solid = false;
+    mat3 frame;
+    Bsdf bsdf;
+    vec3 through = vec3(0.0);
+    if (is_hit) {
+        if (is_sensor) {
+            s = path_sensor();
+        } else {
+            s = surface_point(hit, -ray.direction);
+        }
+        if (path.is_search) {
+            bool is_found;
+            path.ray.origin = interior_note(path.search, hit, s, is_found);
+            if (is_found) {
+                path_enter(path);
+            }
+            return;
+        }
+        is_solid = HAS_DIELECTRIC && s.is_solid;
+        float eta = s.ior;
+        if (is_solid) {
+            boundary = interior_boundary(boundary.beyond, hit, s, ray.direction, result.rays);
+            eta = interior_eta(boundary);
+        }
+        vec3 normal = s.ns;
+        if (HAS_DIELECTRIC && HAS_NORMALS && s.transmission > 0.0) {
+            normal = bsdf_interface_normal(s, -ray.direction, eta);
+        }
+        frame = frame_from_z(normal);
+        float cosine = -dot(ray.direction, normal);
+        bsdf = bsdf_of(s, cosine, eta);
+        if (is_shadow) {
+            bool is_passed = is_solid && boundary.before == boundary.after;
+            through = is_passed ? vec3(1.0) : 1.0 - s.alpha + s.alpha * bsdf_straight(bsdf, cosine);
+        }
+    }
+    if (is_shadow) {
+        path_shadow(path, result, is_hit, s, through, boundary.beyond);
+    } else {
+        path_surface(path, result, s, is_solid, boundary, frame, bsdf);
+    }
+}
+
+// Whether the path needs another step.
+bool path_goes_on(PathState path)
+{
+    return path.is_alive || (HAS_PASSAGE && path.shadow.is_waiting);
 }
 
 #endif

@@ -76,6 +76,7 @@ shared! {
         tile_count: u32,
         interleave: u32,
         film_first_pixel: u32,
+        is_together: u32,
     }
     Instance {
         world_from_object_x: [f32; 3],

@@ -96,7 +96,8 @@ struct Modern {
     max_buffer_bytes: u64,
     maintenance4: bool,
     scalar_block_layout: bool,
-    subgroup_arithmetic: bool,
+    /// Arithmetic and votes in compute shaders.
+    subgroup_operations: bool,
     max_primitives: u64,
     max_instances: u64,
     scratch_alignment: u64,
@@ -196,8 +197,10 @@ fn require_compute(version: u32, has_queue: bool, modern: &Modern) -> Result<(),
         missing.push(format!("Vulkan 1.2 (the device has {major}.{minor})"));
     } else if !modern.scalar_block_layout {
         missing.push(String::from("feature scalarBlockLayout"));
-    } else if !modern.subgroup_arithmetic {
-        missing.push(String::from("subgroup arithmetic in compute shaders"));
+    } else if !modern.subgroup_operations {
+        missing.push(String::from(
+            "subgroup arithmetic and votes in compute shaders",
+        ));
     }
     if !has_queue {
         missing.push(String::from("a queue that computes"));
@@ -293,9 +296,9 @@ fn query_modern(instance: &Instance, physical: vk::PhysicalDevice, version: u32)
         max_buffer_bytes,
         maintenance4: f13.maintenance4 == vk::TRUE,
         scalar_block_layout: f12.scalar_block_layout == vk::TRUE,
-        subgroup_arithmetic: v11
+        subgroup_operations: v11
             .subgroup_supported_operations
-            .contains(vk::SubgroupFeatureFlags::ARITHMETIC)
+            .contains(vk::SubgroupFeatureFlags::ARITHMETIC | vk::SubgroupFeatureFlags::VOTE)
             && v11
                 .subgroup_supported_stages
                 .contains(vk::ShaderStageFlags::COMPUTE),

@@ -6,6 +6,7 @@ pub mod geometry;
 mod lights;
 mod media;
 mod meter;
+mod pace;
 mod passes;
 mod report;
 pub mod solids;
@@ -28,6 +29,7 @@ pub use report::{
     Control, DeviceInfo, Feature, Ledger, Memory, Progress, Report, SceneModel, Times,
 };
 
+use pace::Pace;
 use passes::Passes;
 use upload::SceneData;
 use vulkan::{Band, Batch, VulkanBackend};
@@ -79,6 +81,7 @@ pub struct Renderer {
     settings: Settings,
     tuning: Tuning,
     tiles_per_batch: u32,
+    pace: Pace,
     report: Report,
 }
 
@@ -143,6 +146,7 @@ impl Renderer {
             settings: settings.clone(),
             tuning,
             tiles_per_batch: FIRST_BATCH_TILES.min(tuning.max_tiles),
+            pace: Pace::default(),
             report,
         })
     }
@@ -208,12 +212,24 @@ impl Renderer {
             let mut tile = tiles.start;
             while tile < tiles.end {
                 let count = self.tiles_per_batch.min(tiles.end - tile);
+                let is_together = self.pace.is_together();
+                let is_trial = self.pace.is_trial(1 << level);
+                let rays_before = if is_trial {
+                    self.backend.ledger()?.0
+                } else {
+                    0
+                };
                 let seconds = self.backend.render(&Batch {
                     first_sample: first,
                     samples: 1 << level,
                     tiles: tile..tile + count,
                     film_first_pixel: pixels.start,
+                    is_together,
                 })?;
+                if is_trial {
+                    let rays = self.backend.ledger()?.0 - rays_before;
+                    self.pace.note(is_together, rays, seconds);
+                }
                 tile += count;
                 self.tiles_per_batch =
                     next_batch(self.tiles_per_batch, count, seconds).min(self.tuning.max_tiles);

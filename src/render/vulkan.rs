@@ -73,6 +73,8 @@ pub(super) struct Batch {
     pub samples: u32,
     pub tiles: Range<u32>,
     pub film_first_pixel: u32,
+    /// Lanes of a subgroup start their samples together.
+    pub is_together: bool,
 }
 
 /// A scene on a device, ready to render batches.
@@ -297,6 +299,7 @@ impl VulkanBackend {
             samples: 0,
             tiles: 0..1,
             film_first_pixel: 0,
+            is_together: false,
         };
         self.render(&batch).map(|_| ())
     }
@@ -312,6 +315,7 @@ impl VulkanBackend {
             tile_count: count,
             interleave: self.workers,
             film_first_pixel: batch.film_first_pixel,
+            is_together: u32::from(batch.is_together),
         };
         let groups = count.div_ceil(self.workers) * self.workers;
         let time = self.device.run("path", |commands| {

@@ -77,7 +77,7 @@ pub const MUTANTS: &[Mutant] = &[
         wrong: "bright samples are cut at 10",
         file: "shaders/kernel_path.glsl",
         edits: &[(
-            "vec3(0.0) : path.radiance, vec3(0.0)",
+            "vec3(0.0) : result.radiance, vec3(0.0)",
             "vec3(0.0) : min(path.radiance, vec3(10.0)), vec3(0.0)",
         )],
         killers: &["integrator::closed::closed_room_sums_the_series"],
@@ -94,7 +94,7 @@ pub const MUTANTS: &[Mutant] = &[
         wrong: "what the depth limit cuts off is not counted",
         file: "shaders/kernel_path.glsl",
         edits: &[(
-            "truncated += path.truncated > 0.0 ? 1u : 0u;",
+            "truncated += result.truncated > 0.0 ? 1u : 0u;",
             "truncated += 0u;",
         )],
         killers: &["integrator::closed::closed_room_sums_the_series"],
@@ -104,8 +104,8 @@ pub const MUTANTS: &[Mutant] = &[
         wrong: "weights of the pixel filter are not divided out",
         file: "shaders/kernel_path.glsl",
         edits: &[(
-            "vec3(0.0) : path.radiance, vec3(0.0)",
-            "vec3(0.0) : path.radiance * 2.0 * rng_uniform(key, 0u, SLOT_CAMERA).x, vec3(0.0)",
+            "vec3(0.0) : result.radiance, vec3(0.0)",
+            "vec3(0.0) : result.radiance * 2.0 * rng_uniform(key, 0u, SLOT_CAMERA).x, vec3(0.0)",
         )],
         killers: &["integrator::emission::radiance_of_an_emitter_is_the_same_from_everywhere"],
     },
