@@ -2,6 +2,7 @@
 //! right OpenEXR out.
 
 pub mod bvh;
+pub mod compare;
 pub mod error;
 pub mod film;
 pub mod gpu;

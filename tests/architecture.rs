@@ -20,6 +20,7 @@ const MAY_USE: &[(&str, &[&str])] = &[
     ("scene", &["error", "mutant"]),
     ("film", &["error", "layout", "settings"]),
     ("image_io", &["error", "film", "settings"]),
+    ("compare", &["error", "image_io"]),
     ("spec", &["mutant", "scene", "settings"]),
     (
         "render",

@@ -9,6 +9,8 @@ use etendue::film::MAX_SAMPLES;
 use etendue::image_io::{Aov, Tone};
 use etendue::settings::{BackendChoice, Crop, Estimator, MAX_SIDE};
 
+use super::compare::CompareArgs;
+
 /// A physically based path tracer on Vulkan: glTF in, radiometrically right OpenEXR out.
 #[derive(Parser)]
 #[command(version, max_term_width = 100)]
@@ -25,6 +27,8 @@ pub enum Command {
     Render(Box<RenderArgs>),
     /// Measure light in a scene: irradiance, radiance, intensity or flux
     Measure(Box<MeasureArgs>),
+    /// Compare two images: whether they differ by more than their noise, and how much
+    Compare(CompareArgs),
     /// Show devices and, with a scene, what it holds and needs
     Info(InfoArgs),
 }

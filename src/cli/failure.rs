@@ -14,6 +14,8 @@ pub const USAGE: u8 = 2;
 pub const BAD_SCENE: u8 = 3;
 /// No suitable device.
 pub const NO_DEVICE: u8 = 4;
+/// A comparison found a difference, or a test of the device failed.
+pub const DIFFERENT: u8 = 5;
 /// Stopped by a signal; what was finished is written.
 pub const INTERRUPTED: u8 = 130;
 
@@ -21,6 +23,8 @@ pub const INTERRUPTED: u8 = 130;
 pub enum Outcome {
     /// Everything was done.
     Done,
+    /// What was compared differs.
+    Different,
     /// A signal stopped it.
     Interrupted,
 }

@@ -2,6 +2,7 @@
 //! the library's public items.
 
 mod args;
+mod compare;
 mod failure;
 mod header;
 mod info;
@@ -34,6 +35,10 @@ pub fn main() -> ExitCode {
             log_to_stderr(args.quiet, 0);
             measure::run(&args)
         }
+        Command::Compare(args) => {
+            log_to_stderr(false, 0);
+            compare::run(&args)
+        }
         Command::Info(args) => {
             log_to_stderr(false, 0);
             info::run(&args)
@@ -41,6 +46,7 @@ pub fn main() -> ExitCode {
     };
     match outcome {
         Ok(Outcome::Done) => ExitCode::SUCCESS,
+        Ok(Outcome::Different) => ExitCode::from(failure::DIFFERENT),
         Ok(Outcome::Interrupted) => ExitCode::from(failure::INTERRUPTED),
         Err(failure) => {
             failure.print();
