@@ -27,6 +27,7 @@ pub const SHADERS: &[(&str, &[&str], &str)] = &[
         "test_shading_interface",
     ),
     ("tests/shading_media.comp", &[], "test_shading_media"),
+    ("selftest.comp", &[], "selftest"),
     ("examples/needle.comp", &[], "example_needle"),
 ];
 

@@ -11,6 +11,7 @@ pub mod layout;
 mod mutant;
 pub mod render;
 pub mod scene;
+pub mod selftest;
 pub mod settings;
 pub mod spec;
 

@@ -23,6 +23,12 @@ const MAY_USE: &[(&str, &[&str])] = &[
     ("compare", &["error", "image_io"]),
     ("spec", &["mutant", "scene", "settings"]),
     (
+        "selftest",
+        &[
+            "compare", "error", "film", "gpu", "image_io", "layout", "render", "scene", "settings",
+        ],
+    ),
+    (
         "render",
         &[
             "bvh", "error", "film", "gpu", "layout", "mutant", "scene", "settings", "spec",

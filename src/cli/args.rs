@@ -10,6 +10,7 @@ use etendue::image_io::{Aov, Tone};
 use etendue::settings::{BackendChoice, Crop, Estimator, MAX_SIDE};
 
 use super::compare::CompareArgs;
+use super::selftest::SelftestArgs;
 
 /// A physically based path tracer on Vulkan: glTF in, radiometrically right OpenEXR out.
 #[derive(Parser)]
@@ -29,6 +30,8 @@ pub enum Command {
     Measure(Box<MeasureArgs>),
     /// Compare two images: whether they differ by more than their noise, and how much
     Compare(CompareArgs),
+    /// Test what this device and driver really do
+    Selftest(SelftestArgs),
     /// Show devices and, with a scene, what it holds and needs
     Info(InfoArgs),
 }

@@ -23,7 +23,7 @@ pub const INTERRUPTED: u8 = 130;
 pub enum Outcome {
     /// Everything was done.
     Done,
-    /// What was compared differs.
+    /// What was compared differs, or the device failed a test.
     Different,
     /// A signal stopped it.
     Interrupted,

@@ -10,6 +10,7 @@ mod interrupt;
 mod measure;
 mod progress;
 mod render;
+mod selftest;
 mod stats;
 
 use std::io::{self, IsTerminal, Write};
@@ -38,6 +39,10 @@ pub fn main() -> ExitCode {
         Command::Compare(args) => {
             log_to_stderr(false, 0);
             compare::run(&args)
+        }
+        Command::Selftest(args) => {
+            log_to_stderr(false, 0);
+            selftest::run(&args)
         }
         Command::Info(args) => {
             log_to_stderr(false, 0);

@@ -7,5 +7,6 @@ mod ending;
 mod info;
 mod measure;
 mod render;
+mod selftest;
 mod support;
 mod usage;
