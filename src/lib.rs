@@ -3,6 +3,7 @@
 
 pub mod bvh;
 pub mod compare;
+pub mod chart;
 pub mod error;
 pub mod film;
 pub mod gpu;

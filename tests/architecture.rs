@@ -15,6 +15,7 @@ const MAY_USE: &[(&str, &[&str])] = &[
     ("layout", &[]),
     ("gpu", &["error"]),
     ("bvh", &["error"]),
+    ("chart", &[]),
     ("settings", &["error"]),
     ("mutant", &[]),
     ("scene", &["error", "mutant"]),

@@ -57,7 +57,7 @@ fn main() -> Result<()> {
         let throws = needle::throw(&device, estimator, args.log2, args.seed)?;
         let tail = Tail::of(&throws.kept);
         print_rows(estimator, &throws, tail, args.log2);
-        curves.push(chart::Curve {
+        curves.push(chart::Errors {
             name: estimator.name,
             is_heavy: tail.is_heavy(),
             points: throws.median_errors(estimator.truth, LEAST_BLOCKS),

@@ -15,6 +15,7 @@ mod upload;
 mod view;
 mod vulkan;
 
+use std::ops::Range;
 use std::time::Instant;
 
 use crate::error::{Error, Result};
@@ -149,6 +150,20 @@ impl Renderer {
             pace: Pace::default(),
             report,
         })
+    }
+
+    /// Takes other samples or another seed from here on; nothing is built or compiled again.
+    ///
+    /// # Errors
+    /// No samples, or the device fails.
+    pub fn restart(&mut self, samples: Range<u64>, seed: u64) -> Result<()> {
+        let mut settings = self.settings.clone();
+        settings.samples = samples;
+        settings.seed = seed;
+        settings.validate()?;
+        self.backend.set_seed(seed)?;
+        self.settings = settings;
+        Ok(())
     }
 
     /// Renders the samples of the settings in passes, calling `control` after

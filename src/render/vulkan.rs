@@ -267,6 +267,15 @@ impl VulkanBackend {
         self.device.validation_messages()
     }
 
+    pub fn set_seed(&mut self, seed: u64) -> Result<()> {
+        self.params.seed_low = seed as u32;
+        self.params.seed_high = (seed >> 32) as u32;
+        let mut inputs = self.shared.iter();
+        let params = inputs.find(|(at, _, _)| *at == layout::BIND_PARAMS);
+        let (_, _, buffer) = params.expect("every kernel reads the parameters");
+        buffer.write(0, &[self.params])
+    }
+
     /// Tiles of the window.
     pub fn tiles(&self) -> u32 {
         self.params.tiles_x * self.params.tiles_y

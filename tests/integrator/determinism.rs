@@ -1,7 +1,7 @@
 //! A render is a pure function of the scene and the settings, to the bit.
 
 use etendue::film::Film;
-use etendue::render::Tuning;
+use etendue::render::{Control, DeviceOptions, Renderer, Tuning};
 use etendue::scene::{LightKind, PunctualLight, Scene};
 use etendue::settings::{BackendChoice, Crop, Settings};
 use glam::{DVec3, Vec3};
@@ -107,6 +107,28 @@ fn same_seed_gives_the_same_bits_however_the_work_is_cut() {
                 "{backend:?}: seed {seed:#x} changes nothing"
             );
         }
+    }
+}
+
+#[test]
+fn a_renderer_that_starts_again_is_as_good_as_a_new_one() {
+    for backend in BOTH {
+        let settings = plain(backend);
+        let Some(fresh) = film(&settings, Tuning::default()) else {
+            continue;
+        };
+        let other = Settings {
+            samples: 5..9,
+            seed: 1 << 40,
+            ..settings.clone()
+        };
+        let options = DeviceOptions::default();
+        let mut renderer = Renderer::new(&corner(), &other, &options).unwrap();
+        renderer.render(&mut |_| Control::Continue).unwrap();
+        renderer.restart(settings.samples, settings.seed).unwrap();
+        let again = renderer.render(&mut |_| Control::Continue).unwrap();
+        assert!(bits(&again) == bits(&fresh), "{backend:?}");
+        assert!(renderer.restart(3..3, 0).is_err());
     }
 }
 
