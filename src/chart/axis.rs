@@ -7,7 +7,7 @@ pub enum Scale {
     Linear,
     /// By their logarithm, with marks at powers of two.
     Log2,
-    /// By their logarithm, with marks at powers of ten, or at 1, 2 and 5 times those.
+    /// By their logarithm, with marks at powers of ten, or between them where they are few.
     Log10,
 }
 
@@ -93,7 +93,11 @@ impl Range {
                     self.powers(10.0)
                 } else {
                     let decades = self.from.floor() as i32..=self.to.ceil() as i32;
-                    let parts = decades.flat_map(|e| [1.0, 2.0, 5.0].map(|m| (e, m)));
+                    let steps: &[f64] = match span < 0.8 {
+                        true => &[1.0, 1.5, 2.0, 3.0, 5.0, 7.0],
+                        false => &[1.0, 2.0, 5.0],
+                    };
+                    let parts = decades.flat_map(|e| steps.iter().map(move |m| (e, m)));
                     parts
                         .map(|(e, m)| {
                             let value = m * 10f64.powi(e);
@@ -194,7 +198,12 @@ mod tests {
     fn marks_are_round_numbers() {
         let linear = ["0.0", "0.2", "0.4", "0.6", "0.8", "1.0", "1.2"];
         assert_eq!(labels(Scale::Linear, &[0.3, 1.1]), linear);
-        assert_eq!(labels(Scale::Log10, &[0.3, 1.1]), ["0.5", "1"]);
+        assert_eq!(
+            labels(Scale::Log10, &[0.1, 1.1]),
+            ["0.1", "0.2", "0.5", "1"]
+        );
+        let narrow = ["0.3", "0.5", "0.7", "1"];
+        assert_eq!(labels(Scale::Log10, &[0.3, 1.1]), narrow);
         assert_eq!(labels(Scale::Log10, &[0.02, 40.0]), ["0.1", "1", "10"]);
         let small = ["10⁻³", "10⁻²", "10⁻¹", "10⁰", "10¹"];
         assert_eq!(labels(Scale::Log10, &[0.0012, 40.0]), small);

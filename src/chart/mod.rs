@@ -90,11 +90,15 @@ impl Sheet {
             }
             top += panels.iter().map(Panel::height).fold(0.0, f64::max);
         }
-        let slope = self.panels.iter().find_map(|panel| match panel {
-            Panel::Plot(plot) => plot.slope,
-            Panel::Bars(_) => None,
-        });
-        top = legend(&mut canvas, (width, top), &names, slope);
+        let mut slopes: Vec<f64> = Vec::new();
+        for panel in &self.panels {
+            if let Panel::Plot(Plot { slope: Some(s), .. }) = panel {
+                if !slopes.contains(s) {
+                    slopes.push(*s);
+                }
+            }
+        }
+        top = legend(&mut canvas, (width, top), &names, &slopes);
         if !self.note.is_empty() {
             canvas.text((24.0, top + 14.0), &self.note, r##"fill="#555""##);
             top += LEGEND_ROW;
@@ -104,18 +108,12 @@ impl Sheet {
 }
 
 /// A row or more below `top`, as wide as `at.0`; returns where it ends.
-fn legend(
-    canvas: &mut Canvas,
-    (width, top): At,
-    names: &[(&str, bool)],
-    slope: Option<f64>,
-) -> f64 {
-    let guide = slope.map(|s| {
-        format!(
-            "slope {}",
-            s.to_string().replace('-', "−").replace("0.5", "½")
-        )
-    });
+fn legend(canvas: &mut Canvas, (width, top): At, names: &[(&str, bool)], slopes: &[f64]) -> f64 {
+    let slopes: Vec<String> = slopes
+        .iter()
+        .map(|s| s.to_string().replace('-', "−").replace("0.5", "½"))
+        .collect();
+    let guide = (!slopes.is_empty()).then(|| format!("slope {}", slopes.join(" or ")));
     let lines = names
         .iter()
         .enumerate()

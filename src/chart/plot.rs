@@ -7,8 +7,8 @@ use super::{GREY, WIDTH, stroke};
 /// Height of a panel with its labels, pixels.
 pub const HEIGHT: f64 = 390.0;
 /// The area of the axes: distances from the edges of the panel, pixels.
-const LEFT: f64 = 76.0;
-const RIGHT: f64 = 20.0;
+const LEFT: f64 = 86.0;
+const RIGHT: f64 = 16.0;
 const TOP: f64 = 44.0;
 const BOTTOM: f64 = 62.0;
 /// Points are marked where there are not too many.
@@ -122,7 +122,7 @@ impl Plot {
         let bold = format!(r#"{MIDDLE} font-weight="bold""#);
         canvas.text((middle.0, origin.1 - 16.0), &self.title, &bold);
         canvas.text((middle.0, bottom + 42.0), &self.x.title, MIDDLE);
-        let side = (origin.0 - 56.0, middle.1);
+        let side = (origin.0 - 64.0, middle.1);
         let turned = format!(
             r#"{MIDDLE} transform="rotate(-90 {:.1} {:.1})""#,
             side.0, side.1

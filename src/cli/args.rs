@@ -11,6 +11,7 @@ use etendue::settings::{BackendChoice, Crop, Estimator, MAX_SIDE};
 
 use super::compare::CompareArgs;
 use super::selftest::SelftestArgs;
+use super::bench::args::{BenchArgs, ChartArgs};
 
 /// A physically based path tracer on Vulkan: glTF in, radiometrically right OpenEXR out.
 #[derive(Parser)]
@@ -34,6 +35,10 @@ pub enum Command {
     Selftest(SelftestArgs),
     /// Show devices and, with a scene, what it holds and needs
     Info(InfoArgs),
+    /// Measure error against time, rates and growth; one JSON object a line
+    Bench(Box<BenchArgs>),
+    /// Draw what bench has measured
+    Chart(ChartArgs),
 }
 
 /// `etendue info`
@@ -284,7 +289,7 @@ pub enum ProgressName {
     None,
 }
 
-fn side() -> clap::builder::RangedI64ValueParser<u32> {
+pub fn side() -> clap::builder::RangedI64ValueParser<u32> {
     clap::value_parser!(u32).range(1..=i64::from(MAX_SIDE))
 }
 
@@ -292,7 +297,7 @@ fn aov() -> PossibleValuesParser {
     PossibleValuesParser::new(Aov::ALL.map(Aov::name))
 }
 
-fn positive(text: &str) -> Result<f64, String> {
+pub fn positive(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
         Ok(value) if value > 0.0 && value.is_finite() => Ok(value),
         _ => Err(String::from("must be a number above 0")),

@@ -69,6 +69,11 @@ impl Failure {
         }
     }
 
+    /// The error and its causes as one line.
+    pub fn text(&self) -> String {
+        format!("{:#}", self.error)
+    }
+
     fn lines(&self) -> Vec<String> {
         let mut lines: Vec<String> = Vec::new();
         for cause in self.error.chain() {

@@ -3,6 +3,8 @@
 
 mod args;
 mod compare;
+mod bench;
+mod chart;
 mod failure;
 mod header;
 mod info;
@@ -47,6 +49,14 @@ pub fn main() -> ExitCode {
         Command::Info(args) => {
             log_to_stderr(false, 0);
             info::run(&args)
+        }
+        Command::Bench(args) => {
+            log_to_stderr(args.quiet, 0);
+            bench::run(&args)
+        }
+        Command::Chart(args) => {
+            log_to_stderr(false, 0);
+            chart::run(&args)
         }
     };
     match outcome {

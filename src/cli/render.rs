@@ -133,19 +133,7 @@ fn settings(args: &RenderArgs, scene: &Scene) -> Result<Settings> {
         Some(name) => Some(find_camera(scene, name)?),
         None => None,
     };
-    let aspect = scene
-        .cameras
-        .get(camera.unwrap_or(0))
-        .and_then(aspect)
-        .unwrap_or(DEFAULT_ASPECT);
-    let (width, height) = match (args.width, args.height) {
-        (Some(width), Some(height)) => (width, height),
-        (None, Some(height)) => (pixels(f64::from(height) * aspect), height),
-        (width, None) => {
-            let width = width.unwrap_or(DEFAULT_WIDTH);
-            (width, pixels(f64::from(width) / aspect))
-        }
-    };
+    let (width, height) = frame(scene, camera, args.width, args.height, DEFAULT_WIDTH);
     let samples = args.samples.clone();
     let settings = Settings {
         width,
@@ -162,6 +150,29 @@ fn settings(args: &RenderArgs, scene: &Scene) -> Result<Settings> {
     };
     settings.validate()?;
     Ok(settings)
+}
+
+/// Width and height of the frame: as asked, else by the camera's aspect, else so wide.
+pub fn frame(
+    scene: &Scene,
+    camera: Option<usize>,
+    width: Option<u32>,
+    height: Option<u32>,
+    default_width: u32,
+) -> (u32, u32) {
+    let aspect = scene
+        .cameras
+        .get(camera.unwrap_or(0))
+        .and_then(aspect)
+        .unwrap_or(DEFAULT_ASPECT);
+    match (width, height) {
+        (Some(width), Some(height)) => (width, height),
+        (None, Some(height)) => (pixels(f64::from(height) * aspect), height),
+        (width, None) => {
+            let width = width.unwrap_or(default_width);
+            (width, pixels(f64::from(width) / aspect))
+        }
+    }
 }
 
 /// Whole pixels, at least one.

@@ -1,0 +1,90 @@
+//! Who renders: this program with one estimator, or a peer with one sampler.
+
+use std::cell::RefCell;
+use std::path::Path;
+use std::rc::Rc;
+
+use etendue::Result;
+use etendue::film::Film;
+use etendue::render::{Control, Renderer};
+
+use super::super::failure::{FAILED, Failure};
+use super::error::Picture;
+use super::peer::Peer;
+
+/// A picture and what it took.
+pub struct Shot {
+    pub picture: Picture,
+    /// Between the first and the last sample.
+    pub seconds: f64,
+    /// Absent where a peer does not count.
+    pub rays: Option<u64>,
+}
+
+/// Renders the loaded scene again and again.
+pub enum Contender {
+    /// This program.
+    Own {
+        name: String,
+        renderer: Box<Renderer>,
+    },
+    /// Another one.
+    Peer {
+        name: String,
+        sampler: String,
+        process: Rc<RefCell<Peer>>,
+    },
+}
+
+impl Contender {
+    pub fn name(&self) -> &str {
+        match self {
+            Self::Own { name, .. } | Self::Peer { name, .. } => name,
+        }
+    }
+
+    pub fn is_peer(&self) -> bool {
+        matches!(self, Self::Peer { .. })
+    }
+
+    pub fn render(&mut self, spp: u64, seed: u64, scratch: &Path) -> Result<Shot, Failure> {
+        match self {
+            Self::Own { renderer, .. } => {
+                let film = render_all(renderer, spp, seed)?;
+                let report = renderer.report();
+                Ok(Shot {
+                    picture: film.mean(),
+                    seconds: report.times.render,
+                    rays: Some(report.rays),
+                })
+            }
+            Self::Peer {
+                sampler, process, ..
+            } => {
+                let mut process = process.borrow_mut();
+                let (picture, seconds) = process
+                    .render(sampler, spp, seed, scratch)
+                    .map_err(|error| Failure::new(FAILED, error, "render with a peer"))?;
+                Ok(Shot {
+                    picture,
+                    seconds,
+                    rays: None,
+                })
+            }
+        }
+    }
+}
+
+/// All of so many samples.
+pub fn render_all(renderer: &mut Renderer, spp: u64, seed: u64) -> Result<Film> {
+    renderer.restart(0..spp, seed)?;
+    renderer.render(&mut |_| Control::Continue)
+}
+
+/// Finds the size of batches that fits, which a first render only feels for.
+pub fn warm_up(renderer: &mut Renderer) -> Result<()> {
+    for _ in 0..2 {
+        render_all(renderer, 4, 0)?;
+    }
+    Ok(())
+}

@@ -1,0 +1,320 @@
+//! Error against time: every contender renders a scene with more and more samples.
+
+use std::cell::RefCell;
+use std::path::{Path, PathBuf};
+use std::rc::Rc;
+
+use etendue::film::Film;
+use etendue::image_io::{Channel, Image, Metadata, Tone, write_png};
+use etendue::render::{DeviceOptions, Renderer};
+use etendue::scene::Scene;
+use etendue::settings::{Estimator, Settings};
+
+use super::super::failure::{FAILED, Failure};
+use super::args::BenchArgs;
+use super::contender::{Contender, render_all, warm_up};
+use super::error::{Picture, Reference, mean};
+use super::peer::Peer;
+use super::record::{self, Agreement, Bias, Line, Run, Skipped, Start};
+use super::reference::{self, reference};
+use super::{Output, scene_name};
+
+/// The reference has so many times the samples of the longest run when none are asked for.
+const REFERENCE_FACTOR: u64 = 128;
+/// Below this factor the noise of the reference shows in the errors.
+const LEAST_FACTOR: u64 = 100;
+/// A peer whose mean is further off solves another problem.
+const ALLOWED_DIFFERENCE: f64 = 0.003;
+/// Samples of the render by which a budget is turned into samples.
+const PILOT_SPP: u64 = 8;
+
+/// A scene and how it is rendered.
+pub struct Contest<'a> {
+    pub args: &'a BenchArgs,
+    pub path: &'a Path,
+    pub scene: &'a Scene,
+    pub settings: &'a Settings,
+    pub options: &'a DeviceOptions,
+    /// Seconds it took to load the scene.
+    pub load: f64,
+}
+
+impl Contest<'_> {
+    /// Renders and writes lines.
+    pub fn run(&self, peers: &[Rc<RefCell<Peer>>], out: &mut Output) -> Result<(), Failure> {
+        let name = scene_name(self.path);
+        let mut contenders = Vec::new();
+        for estimator in self.args.estimators() {
+            contenders.push(self.own(estimator, &name, out)?);
+        }
+        let mut judge = self.renderer(Estimator::Full)?;
+        let ladder = self.ladder(&mut judge)?;
+        let most = ladder.iter().copied().max().unwrap_or(1);
+        let spp = self.args.reference.unwrap_or(REFERENCE_FACTOR * most);
+        if spp < LEAST_FACTOR * most {
+            out.note(&format!(
+                "warning: {name}: a reference of {spp} samples is noisy beside runs of {most}; {} would be enough",
+                LEAST_FACTOR * most
+            ));
+        }
+        out.note(&format!("{name}: reference of {spp} samples"));
+        let source = (name.as_str(), self.scene.hash.as_str());
+        let folder = out.beside("references");
+        let truth = reference(&mut judge, source, self.settings, spp, &folder)?;
+        out.line(&Line::Scene(self.describe(&name, spp, &truth)))?;
+        for peer in peers {
+            self.invite(peer, &name, &mut contenders, out)?;
+        }
+        self.compete(&name, &ladder, &mut contenders, &truth, out)
+    }
+
+    fn renderer(&self, estimator: Estimator) -> Result<Renderer, Failure> {
+        let settings = Settings {
+            estimator,
+            ..self.settings.clone()
+        };
+        Ok(Renderer::new(self.scene, &settings, self.options)?)
+    }
+
+    fn own(
+        &self,
+        estimator: Estimator,
+        scene: &str,
+        out: &mut Output,
+    ) -> Result<Contender, Failure> {
+        let mut renderer = self.renderer(estimator)?;
+        warm_up(&mut renderer)?;
+        let times = renderer.report().times;
+        let name = format!("etendue {}", estimator.name());
+        out.line(&Line::Start(Start {
+            scene: scene.to_owned(),
+            contender: name.clone(),
+            build: self.load + times.build,
+            compile: times.compile,
+        }))?;
+        Ok(Contender::Own {
+            name,
+            renderer: Box::new(renderer),
+        })
+    }
+
+    /// Samples a pixel of the runs.
+    fn ladder(&self, renderer: &mut Renderer) -> Result<Vec<u64>, Failure> {
+        let Some(budget) = self.args.budget else {
+            return Ok(self.args.spp.clone());
+        };
+        render_all(renderer, PILOT_SPP, 0)?;
+        let each = renderer.report().times.render / PILOT_SPP as f64;
+        let most = (budget / each).max(1.0).log2() as u32;
+        Ok((0..=most).map(|level| 1 << level).collect())
+    }
+
+    fn describe(&self, name: &str, spp: u64, truth: &Reference) -> record::Scene {
+        record::Scene {
+            scene: name.to_owned(),
+            hash: self.scene.hash.clone(),
+            width: self.settings.width,
+            height: self.settings.height,
+            max_depth: self.settings.max_depth,
+            triangles: self.scene.triangle_count(),
+            reference_spp: spp,
+            reference_seeds: reference::SEEDS,
+            reference_estimator: reference::ESTIMATOR.to_owned(),
+            mean: truth.mean(),
+            epsilon: truth.epsilon,
+        }
+    }
+
+    /// A peer takes part with each of its samplers, or it is said why not. Its first picture tells what compiling takes.
+    fn invite(
+        &self,
+        peer: &Rc<RefCell<Peer>>,
+        scene: &str,
+        contenders: &mut Vec<Contender>,
+        out: &mut Output,
+    ) -> Result<(), Failure> {
+        let size = (self.settings.width, self.settings.height);
+        let loaded = peer
+            .borrow_mut()
+            .load(self.path, size, self.settings.max_depth);
+        let loaded = match loaded {
+            Ok(loaded) => loaded,
+            Err(error) => {
+                let contender = peer.borrow().script.clone();
+                return skip(scene, &contender, &format!("{error:#}"), out);
+            }
+        };
+        for sampler in loaded.samplers {
+            let mut contender = Contender::Peer {
+                name: format!("{} {sampler}", loaded.name),
+                sampler,
+                process: Rc::clone(peer),
+            };
+            match contender.render(1, 0, &out.scratch()) {
+                Ok(first) => {
+                    out.line(&Line::Start(Start {
+                        scene: scene.to_owned(),
+                        contender: contender.name().to_owned(),
+                        build: loaded.build,
+                        compile: first.seconds,
+                    }))?;
+                    contenders.push(contender);
+                }
+                Err(failure) => skip(scene, contender.name(), &failure.text(), out)?,
+            }
+        }
+        Ok(())
+    }
+
+    /// The runs: contenders alternate, so that all meet the same conditions.
+    fn compete(
+        &self,
+        scene: &str,
+        ladder: &[u64],
+        contenders: &mut [Contender],
+        truth: &Reference,
+        out: &mut Output,
+    ) -> Result<(), Failure> {
+        let pixels = f64::from(self.settings.width) * f64::from(self.settings.height);
+        let mut sums = vec![([0.0; 3], 0.0); contenders.len()];
+        for (rung, &spp) in ladder.iter().enumerate() {
+            out.note(&format!("{scene}: {spp} samples a pixel"));
+            for peer in contenders.iter_mut().filter(|c| c.is_peer()) {
+                // kernels of peers may depend on the number of samples
+                peer.render(spp, 0, &out.scratch())?;
+            }
+            let mut pictures: Vec<Vec<Picture>> = vec![Vec::new(); contenders.len()];
+            for seed in 1..=self.args.seeds {
+                for (i, contender) in contenders.iter_mut().enumerate() {
+                    let shot = contender.render(spp, seed, &out.scratch())?;
+                    let errors = truth.errors(&shot.picture);
+                    let mean = mean(&shot.picture);
+                    for (sum, value) in sums[i].0.iter_mut().zip(mean) {
+                        *sum += value * spp as f64;
+                    }
+                    sums[i].1 += spp as f64;
+                    out.line(&Line::Run(Run {
+                        scene: scene.to_owned(),
+                        contender: contender.name().to_owned(),
+                        spp,
+                        seed,
+                        seconds: shot.seconds,
+                        paths_per_second: spp as f64 * pixels / shot.seconds,
+                        rays_per_second: shot.rays.map(|rays| rays as f64 / shot.seconds),
+                        rmse: errors.rmse,
+                        relmse: errors.relmse,
+                        relmse_trimmed: errors.relmse_trimmed,
+                        mean,
+                    }))?;
+                    pictures[i].push(shot.picture);
+                }
+            }
+            for (contender, pictures) in contenders.iter().zip(&pictures) {
+                bias(scene, contender, spp, truth, pictures, out)?;
+                if self.args.pictures && rung + 1 == ladder.len() {
+                    self.picture(scene, contender.name(), spp, &pictures[0], out)?;
+                }
+            }
+        }
+        if self.args.pictures {
+            let whole = average(&truth.halves);
+            self.picture(scene, "reference", 0, &whole, out)?;
+        }
+        for (contender, (sum, weight)) in contenders.iter().zip(sums) {
+            if contender.is_peer() {
+                let line = agreement(scene, contender, truth, sum.map(|s| s / weight));
+                out.line(&Line::Agreement(line))?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Writes a picture for people beside the bench file.
+    fn picture(
+        &self,
+        scene: &str,
+        contender: &str,
+        spp: u64,
+        pixels: &Picture,
+        out: &mut Output,
+    ) -> Result<(), Failure> {
+        let folder = out.beside("pictures");
+        std::fs::create_dir_all(&folder)
+            .map_err(|error| Failure::new(FAILED, error, "make the folder of the pictures"))?;
+        let name: String = format!("{scene}-{contender}.png").replace([' ', '/'], "-");
+        let path: PathBuf = folder.join(name);
+        let (width, height) = (self.settings.width, self.settings.height);
+        let empty = Film::new(self.settings.window(), (width, height), false);
+        let mut image = Image::from_film(&empty, &[], Metadata::new())?;
+        image.channels = ["R", "G", "B"]
+            .into_iter()
+            .enumerate()
+            .map(|(i, name)| Channel {
+                name: name.to_owned(),
+                values: pixels.iter().map(|p| p[i]).collect(),
+            })
+            .collect();
+        write_png(&path, &image, Tone::Srgb, 0.0)?;
+        out.line(&Line::Picture(record::Picture {
+            scene: scene.to_owned(),
+            contender: contender.to_owned(),
+            spp,
+            file: out.relative(&path),
+        }))
+    }
+}
+
+fn skip(scene: &str, contender: &str, reason: &str, out: &mut Output) -> Result<(), Failure> {
+    out.note(&format!("{scene}: without {contender}: {reason}"));
+    out.line(&Line::Skipped(Skipped {
+        scene: scene.to_owned(),
+        contender: contender.to_owned(),
+        reason: reason.to_owned(),
+    }))
+}
+
+fn average([a, b]: &[Picture; 2]) -> Picture {
+    let pixel = |(a, b): (&[f32; 3], &[f32; 3])| std::array::from_fn(|i| 0.5 * (a[i] + b[i]));
+    a.iter().zip(b).map(pixel).collect()
+}
+
+/// One picture has no scatter to tell bias from.
+fn bias(
+    scene: &str,
+    contender: &Contender,
+    spp: u64,
+    truth: &Reference,
+    pictures: &[Picture],
+    out: &mut Output,
+) -> Result<(), Failure> {
+    if pictures.len() < 2 {
+        return Ok(());
+    }
+    let together = truth.together(pictures);
+    out.line(&Line::Bias(Bias {
+        scene: scene.to_owned(),
+        contender: contender.name().to_owned(),
+        spp,
+        seeds: pictures.len(),
+        bias2: together.bias2,
+        bias2_error: together.bias2_error,
+        variance: together.variance,
+    }))
+}
+
+fn agreement(scene: &str, contender: &Contender, truth: &Reference, mean: [f64; 3]) -> Agreement {
+    let wanted = truth.mean();
+    let brightest = wanted.iter().copied().fold(0.0, f64::max);
+    let difference = wanted
+        .iter()
+        .zip(mean)
+        .map(|(wanted, mean)| (mean - wanted).abs() / wanted.max(0.01 * brightest))
+        .fold(0.0, f64::max);
+    Agreement {
+        scene: scene.to_owned(),
+        contender: contender.name().to_owned(),
+        difference,
+        allowed: ALLOWED_DIFFERENCE,
+        agrees: difference <= ALLOWED_DIFFERENCE,
+    }
+}
