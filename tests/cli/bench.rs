@@ -134,7 +134,7 @@ fn the_report_compares_at_equal_error() {
     }
     let cheat = json!({
         "kind": "agreement", "scene": "a <scene>", "contender": "cheat",
-        "difference": 0.25, "allowed": 0.003, "agrees": false,
+        "difference": 0.25, "error": 0.001, "allowed": 0.003, "agrees": false,
     });
     text += &format!("{cheat}\n");
     fs::write(folder.path().join("b.jsonl"), text).unwrap();

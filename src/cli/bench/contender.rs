@@ -15,6 +15,8 @@ use super::peer::Peer;
 /// A picture and what it took.
 pub struct Shot {
     pub picture: Picture,
+    /// Samples a pixel: what was asked for, or more.
+    pub spp: u64,
     /// Between the first and the last sample.
     pub seconds: f64,
     /// Absent where a peer does not count.
@@ -54,6 +56,7 @@ impl Contender {
                 let report = renderer.report();
                 Ok(Shot {
                     picture: film.mean(),
+                    spp,
                     seconds: report.times.render,
                     rays: Some(report.rays),
                 })
@@ -62,11 +65,12 @@ impl Contender {
                 sampler, process, ..
             } => {
                 let mut process = process.borrow_mut();
-                let (picture, seconds) = process
+                let (picture, seconds, spp) = process
                     .render(sampler, spp, seed, scratch)
                     .map_err(|error| Failure::new(FAILED, error, "render with a peer"))?;
                 Ok(Shot {
                     picture,
+                    spp,
                     seconds,
                     rays: None,
                 })

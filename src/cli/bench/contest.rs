@@ -25,6 +25,8 @@ const REFERENCE_FACTOR: u64 = 128;
 const LEAST_FACTOR: u64 = 100;
 /// A peer whose mean is further off solves another problem.
 const ALLOWED_DIFFERENCE: f64 = 0.003;
+/// A picture of so many times the samples of the longest run joins the means of a peer.
+const CONVERGED_FACTOR: u64 = 16;
 /// Samples of the render by which a budget is turned into samples.
 const PILOT_SPP: u64 = 8;
 
@@ -176,7 +178,7 @@ impl Contest<'_> {
         out: &mut Output,
     ) -> Result<(), Failure> {
         let pixels = f64::from(self.settings.width) * f64::from(self.settings.height);
-        let mut sums = vec![([0.0; 3], 0.0); contenders.len()];
+        let mut means: Vec<Means> = vec![Means::new(); contenders.len()];
         for (rung, &spp) in ladder.iter().enumerate() {
             out.note(&format!("{scene}: {spp} samples a pixel"));
             for peer in contenders.iter_mut().filter(|c| c.is_peer()) {
@@ -189,17 +191,14 @@ impl Contest<'_> {
                     let shot = contender.render(spp, seed, &out.scratch())?;
                     let errors = truth.errors(&shot.picture);
                     let mean = mean(&shot.picture);
-                    for (sum, value) in sums[i].0.iter_mut().zip(mean) {
-                        *sum += value * spp as f64;
-                    }
-                    sums[i].1 += spp as f64;
+                    means[i].push((shot.spp, mean));
                     out.line(&Line::Run(Run {
                         scene: scene.to_owned(),
                         contender: contender.name().to_owned(),
-                        spp,
+                        spp: shot.spp,
                         seed,
                         seconds: shot.seconds,
-                        paths_per_second: spp as f64 * pixels / shot.seconds,
+                        paths_per_second: shot.spp as f64 * pixels / shot.seconds,
                         rays_per_second: shot.rays.map(|rays| rays as f64 / shot.seconds),
                         rmse: errors.rmse,
                         relmse: errors.relmse,
@@ -220,9 +219,12 @@ impl Contest<'_> {
             let whole = average(&truth.halves);
             self.picture(scene, "reference", 0, &whole, out)?;
         }
-        for (contender, (sum, weight)) in contenders.iter().zip(sums) {
+        let converged = CONVERGED_FACTOR * ladder.iter().copied().max().unwrap_or(1);
+        for (contender, means) in contenders.iter_mut().zip(&mut means) {
             if contender.is_peer() {
-                let line = agreement(scene, contender, truth, sum.map(|s| s / weight));
+                let shot = contender.render(converged, 0, &out.scratch())?;
+                means.push((shot.spp, mean(&shot.picture)));
+                let line = agreement(scene, contender.name(), truth, means);
                 out.line(&Line::Agreement(line))?;
             }
         }
@@ -302,19 +304,37 @@ fn bias(
     }))
 }
 
-fn agreement(scene: &str, contender: &Contender, truth: &Reference, mean: [f64; 3]) -> Agreement {
+/// Samples and means of the pictures of a contender.
+type Means = Vec<(u64, [f64; 3])>;
+
+/// The channel that deviates most decides.
+fn agreement(scene: &str, contender: &str, truth: &Reference, means: &Means) -> Agreement {
+    let [a, b] = [mean(&truth.halves[0]), mean(&truth.halves[1])];
     let wanted = truth.mean();
     let brightest = wanted.iter().copied().fold(0.0, f64::max);
-    let difference = wanted
-        .iter()
-        .zip(mean)
-        .map(|(wanted, mean)| (mean - wanted).abs() / wanted.max(0.01 * brightest))
-        .fold(0.0, f64::max);
+    let channel = |i: usize| {
+        let samples: f64 = means.iter().map(|(spp, _)| *spp as f64).sum();
+        let sum: f64 = means.iter().map(|(spp, m)| *spp as f64 * m[i]).sum();
+        let whole = sum / samples;
+        // the variance of a picture's mean goes with one over its samples
+        let squares = means.iter();
+        let squares: f64 = squares
+            .map(|(spp, m)| *spp as f64 * (m[i] - whole).powi(2))
+            .sum();
+        let variance = squares / ((means.len() - 1).max(1) as f64 * samples);
+        let error = (variance + 0.25 * (a[i] - b[i]).powi(2)).sqrt();
+        let scale = wanted[i].max(0.01 * brightest);
+        ((whole - wanted[i]).abs() / scale, error / scale)
+    };
+    let channels = [0, 1, 2].map(channel);
+    let worst = channels.into_iter().max_by(|x, y| x.0.total_cmp(&y.0));
+    let (difference, error) = worst.unwrap_or_default();
     Agreement {
         scene: scene.to_owned(),
-        contender: contender.name().to_owned(),
+        contender: contender.to_owned(),
         difference,
+        error,
         allowed: ALLOWED_DIFFERENCE,
-        agrees: difference <= ALLOWED_DIFFERENCE,
+        agrees: difference <= ALLOWED_DIFFERENCE + 2.0 * error && error <= ALLOWED_DIFFERENCE,
     }
 }

@@ -36,7 +36,7 @@ pub struct Loaded {
 #[serde(rename_all = "kebab-case")]
 enum Answer {
     Loaded(Loaded),
-    Rendered { seconds: f64 },
+    Rendered { seconds: f64, spp: u64 },
     Cannot(String),
 }
 
@@ -93,19 +93,19 @@ impl Peer {
         }
     }
 
-    /// The picture and the seconds that it took.
+    /// The picture, the seconds that it took, and its samples: some samplers round them.
     pub fn render(
         &mut self,
         sampler: &str,
         spp: u64,
         seed: u64,
         scratch: &Path,
-    ) -> Result<(Picture, f64)> {
+    ) -> Result<(Picture, f64, u64)> {
         let request = json!({ "render": {
             "sampler": sampler, "spp": spp, "seed": seed, "file": scratch,
         }});
-        let seconds = match self.ask(&request)? {
-            Answer::Rendered { seconds } => seconds,
+        let (seconds, spp) = match self.ask(&request)? {
+            Answer::Rendered { seconds, spp } => (seconds, spp),
             Answer::Cannot(reason) => bail!("{reason}"),
             Answer::Loaded(_) => bail!("{} answers another question", self.script),
         };
@@ -121,7 +121,7 @@ impl Peer {
             let count = picture.len();
             bail!("{} gives {count} pixels, not {}", self.script, self.pixels);
         }
-        Ok((picture, seconds))
+        Ok((picture, seconds, spp))
     }
 
     fn ask(&mut self, request: &serde_json::Value) -> Result<Answer> {

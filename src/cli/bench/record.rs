@@ -132,8 +132,11 @@ pub struct Agreement {
     pub contender: String,
     /// Largest relative deviation of a channel's mean from the reference's; of a channel that is dark, relative to the brightest.
     pub difference: f64,
+    /// Standard error of that, by the scatter of the runs and of the halves of the reference.
+    pub error: f64,
     /// Most that it may be.
     pub allowed: f64,
+    /// The difference is allowed within two standard errors, and the error is no larger than what is allowed.
     pub agrees: bool,
 }
 

@@ -1,0 +1,36 @@
+"""What etendue bench and a peer say to each other; see README.md."""
+import json
+import os
+import sys
+import time
+import traceback
+
+import gltf_scene
+
+
+def serve(load, render):
+    """Answers requests until there are none. load(scene) → (name, samplers), render(sampler, spp, seed) → (array of
+    height × width × 3, samples used, seconds); both may raise gltf_scene.Cannot."""
+    # Renderers print to stdout; that goes to stderr, and the answers to where stdout was.
+    answers = os.fdopen(os.dup(1), "w")
+    os.dup2(2, 1)
+    for line in sys.stdin:
+        answer = None
+        try:
+            request = json.loads(line)
+            start = time.perf_counter()
+            if "load" in request:
+                name, samplers = load(**request["load"])
+                seconds = time.perf_counter() - start
+                answer = {"loaded": {"name": name, "samplers": samplers, "build": seconds}}
+            else:
+                job = request["render"]
+                picture, spp, seconds = render(job["sampler"], job["spp"], job["seed"])
+                picture.astype("<f4").tofile(job["file"])
+                answer = {"rendered": {"seconds": seconds, "spp": spp}}
+        except gltf_scene.Cannot as reason:
+            answer = {"cannot": str(reason)}
+        except Exception as error:  # a peer that fails is left out, not the whole bench
+            traceback.print_exc()
+            answer = {"cannot": f"{type(error).__name__}: {str(error).strip()[:300]}"}
+        print(json.dumps(answer), file=answers, flush=True)
