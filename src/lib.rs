@@ -2,8 +2,8 @@
 //! right OpenEXR out.
 
 pub mod bvh;
-pub mod compare;
 pub mod chart;
+pub mod compare;
 pub mod error;
 pub mod film;
 pub mod gpu;

@@ -9,9 +9,9 @@ use etendue::film::MAX_SAMPLES;
 use etendue::image_io::{Aov, Tone};
 use etendue::settings::{BackendChoice, Crop, Estimator, MAX_SIDE};
 
+use super::bench::args::{BenchArgs, ChartArgs};
 use super::compare::CompareArgs;
 use super::selftest::SelftestArgs;
-use super::bench::args::{BenchArgs, ChartArgs};
 
 /// A physically based path tracer on Vulkan: glTF in, radiometrically right OpenEXR out.
 #[derive(Parser)]

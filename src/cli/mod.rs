@@ -2,9 +2,9 @@
 //! the library's public items.
 
 mod args;
-mod compare;
 mod bench;
 mod chart;
+mod compare;
 mod failure;
 mod header;
 mod info;

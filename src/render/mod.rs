@@ -259,7 +259,7 @@ impl Renderer {
 
     /// Renders these samples from now on; what was compiled and uploaded stays.
     #[doc(hidden)]
-    pub fn set_samples(&mut self, samples: std::ops::Range<u64>) {
+    pub fn set_samples(&mut self, samples: Range<u64>) {
         self.settings.samples = samples;
     }
 

@@ -2,8 +2,8 @@
 #![allow(clippy::unwrap_used, reason = "a step that fails fails the test")]
 #![allow(clippy::print_stderr, reason = "a test that is skipped says so")]
 
-mod compare;
 mod bench;
+mod compare;
 mod ending;
 mod info;
 mod measure;
