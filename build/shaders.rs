@@ -15,8 +15,23 @@ pub const SHADERS: &[(&str, &[&str], &str)] = &[
         &["TRAVERSE_QUERY", "KERNEL_PROBE"],
         "probe_query",
     ),
+    ("kernel.rgen", &["TRAVERSE_PIPELINE"], "path_pipeline"),
+    (
+        "kernel.rgen",
+        &["TRAVERSE_PIPELINE", "KERNEL_PROBE"],
+        "probe_pipeline",
+    ),
+    ("trace.rmiss", &[], "trace_miss"),
+    ("trace.rchit", &[], "trace_closest_hit"),
+    ("trace.rahit", &[], "trace_any_hit"),
     ("tests/resources.comp", &[], "test_resources"),
     ("tests/rays.comp", &[], "test_rays"),
+    (
+        "tests/rays.rgen",
+        &["TRAVERSE_PIPELINE"],
+        "test_rays_pipeline",
+    ),
+    ("tests/rays.rahit", &[], "test_rays_any_hit"),
     ("tests/shading_samplers.comp", &[], "test_shading_samplers"),
     ("tests/shading_values.comp", &[], "test_shading_values"),
     ("tests/shading_random.comp", &[], "test_shading_random"),
@@ -30,6 +45,19 @@ pub const SHADERS: &[(&str, &[&str], &str)] = &[
     ("selftest.comp", &[], "selftest"),
     ("examples/needle.comp", &[], "example_needle"),
 ];
+
+/// The stage, by the suffix of the file.
+fn kind(source: &str) -> shaderc::ShaderKind {
+    use shaderc::ShaderKind as Kind;
+    match source.rsplit('.').next() {
+        Some("comp") => Kind::Compute,
+        Some("rgen") => Kind::RayGeneration,
+        Some("rmiss") => Kind::Miss,
+        Some("rchit") => Kind::ClosestHit,
+        Some("rahit") => Kind::AnyHit,
+        _ => panic!("{source}: no stage has this suffix"),
+    }
+}
 
 /// SPIR-V of one entry of the table. `read` gives the text of a file below `shaders`.
 ///
@@ -62,7 +90,7 @@ pub fn compile(
         }),
         Err(error) => Err(format!("{name}, included from {from}: {error}")),
     });
-    let kind = shaderc::ShaderKind::Compute;
+    let kind = kind(source);
     let path = format!("shaders/{source}");
     match compiler.compile_into_spirv(&text, kind, &path, "main", Some(&options)) {
         Ok(artifact) => artifact.as_binary_u8().to_vec(),

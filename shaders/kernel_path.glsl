@@ -2,9 +2,8 @@
 // One invocation computes all samples of its pixel, in order.
 
 #include "film.glsl"
+#include "invocation.glsl"
 #include "path.glsl"
-
-layout(local_size_x = 64, local_size_y = 1, local_size_z = 1) in;
 
 layout(push_constant, scalar) uniform BatchBlock { Batch batch; };
 
@@ -44,11 +43,11 @@ PathState kernel_start(uint i, uvec2 pixel)
 
 void main()
 {
-    uint tile = kernel_tile(gl_WorkGroupID.x);
+    uint tile = kernel_tile(invocation_group());
     if (tile == NONE) {
         return;
     }
-    uvec2 at = TILE * uvec2(tile % params.tiles_x, tile / params.tiles_x) + kernel_place(gl_LocalInvocationID.x);
+    uvec2 at = TILE * uvec2(tile % params.tiles_x, tile / params.tiles_x) + kernel_place(invocation_place());
     if (at.x >= params.window_width || at.y >= params.window_height) {
         return;
     }
@@ -67,7 +66,7 @@ void main()
             path_step(path, result);
         }
         bool goes_on = path_goes_on(path);
-        if (batch.is_together != 0u ? subgroupAny(goes_on) : goes_on) {
+        if (batch.is_together != 0u ? invocation_any(goes_on) : goes_on) {
             continue;
         }
         rays += result.rays;
@@ -109,8 +108,8 @@ void main()
     if (HAS_NESTED && interior_overflows != 0u) {
         atomicAdd(ledger[LEDGER_INTERIOR_OVERFLOWS], interior_overflows);
     }
-    uint subgroup_rays = subgroupAdd(rays);
-    if (subgroupElect()) {
-        ledger_add(LEDGER_RAYS_LOW, subgroup_rays);
+    uint rays_together = invocation_sum(rays);
+    if (invocation_adds()) {
+        ledger_add(LEDGER_RAYS_LOW, rays_together);
     }
 }

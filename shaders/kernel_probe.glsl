@@ -1,8 +1,7 @@
 // Traces given rays and returns what they meet: tests, and layers of identities.
 
+#include "invocation.glsl"
 #include "surface.glsl"
-
-layout(local_size_x = 64, local_size_y = 1, local_size_z = 1) in;
 
 layout(binding = BIND_PROBE_RAYS, scalar) readonly buffer ProbeRaysBlock { ProbeRay probe_rays[]; };
 layout(binding = BIND_PROBE_HITS, scalar) writeonly buffer ProbeHitsBlock { ProbeHit probe_hits[]; };
@@ -11,7 +10,7 @@ layout(push_constant, scalar) uniform BatchBlock { Batch batch; };
 
 void main()
 {
-    uint i = gl_GlobalInvocationID.x;
+    uint i = INVOCATION_GROUP * invocation_group() + invocation_place();
     if (i >= batch.sample_count) {
         return;
     }

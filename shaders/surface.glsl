@@ -42,9 +42,6 @@ struct SurfacePoint {
     vec3 strength;     // factor on a dielectric's reflection
 };
 
-// With HAS_NESTED: (instance, primitive) that rays pass as if it were not there.
-uvec2 surface_skip = uvec2(NONE);
-
 // World-space corner and edges of a triangle, with the error of points on it.
 struct TriangleShape {
     vec3 v0;

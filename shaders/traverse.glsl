@@ -21,8 +21,14 @@ struct Hit {
 // Deterministic alpha test; defined in surface.glsl.
 bool surface_is_opaque(uint instance, uint primitive, vec2 bary);
 
+// With HAS_NESTED: (instance, primitive) that rays pass as if it were not there.
+uvec2 surface_skip = uvec2(NONE);
+
 #ifdef TRAVERSE_QUERY
 #include "traverse_query.glsl"
+#endif
+#ifdef TRAVERSE_PIPELINE
+#include "traverse_pipeline.glsl"
 #endif
 #ifdef TRAVERSE_SOFTWARE
 #include "traverse_software.glsl"

@@ -15,6 +15,8 @@ pub enum BackendChoice {
     Auto,
     /// VK_KHR_ray_query in a compute shader.
     RayQuery,
+    /// VK_KHR_ray_tracing_pipeline: the same kernel as a ray generation shader.
+    RayPipeline,
     /// Our own bounding volume hierarchy in a compute shader.
     Bvh,
 }
@@ -25,6 +27,7 @@ impl BackendChoice {
         match self {
             Self::Auto => "auto",
             Self::RayQuery => "ray-query",
+            Self::RayPipeline => "ray-pipeline",
             Self::Bvh => "bvh",
         }
     }

@@ -118,6 +118,11 @@ impl Spec {
         }
     }
 
+    /// Whether traversals ask of some triangles if they are there: `HAS_CANDIDATES`.
+    pub(crate) fn has_candidates(&self) -> bool {
+        self.alpha || self.nested
+    }
+
     /// Names of the features with their state, for people and files.
     pub fn features(&self) -> [(&'static str, bool); 19] {
         [
@@ -230,4 +235,10 @@ pub(crate) mod kernels {
     pub(crate) const PATH_QUERY: Kernel = kernel!("path_query");
     pub(crate) const PROBE_SOFTWARE: Kernel = kernel!("probe_software");
     pub(crate) const PROBE_QUERY: Kernel = kernel!("probe_query");
+    pub(crate) const PATH_PIPELINE: Kernel = kernel!("path_pipeline");
+    pub(crate) const PROBE_PIPELINE: Kernel = kernel!("probe_pipeline");
+    /// What the ray generation shaders call.
+    pub(crate) const TRACE_MISS: Kernel = kernel!("trace_miss");
+    pub(crate) const TRACE_CLOSEST_HIT: Kernel = kernel!("trace_closest_hit");
+    pub(crate) const TRACE_ANY_HIT: Kernel = kernel!("trace_any_hit");
 }

@@ -19,11 +19,14 @@ use etendue::spec::Spec;
 use spirv::Module;
 
 /// The kernels that render and probe; test kernels have bindings of their own.
-const KERNELS: [&str; 4] = [
+const KERNELS: [&str; 7] = [
     "path_software",
     "path_query",
+    "path_pipeline",
     "probe_software",
     "probe_query",
+    "probe_pipeline",
+    "trace_any_hit",
 ];
 
 fn shader(name: &str) -> String {

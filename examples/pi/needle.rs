@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use anyhow::Result;
 use etendue::gpu::{
-    BindSet, BindingKind, Buffer, ComputePipeline, Device, Memory, PipelineDesc, Resource, Usage,
+    BindSet, BindingKind, Buffer, Device, Memory, Pipeline, PipelineDesc, Resource, Usage,
 };
 
 const KERNEL: &[u8] = include_bytes!(concat!(env!("OUT_DIR"), "/example_needle.spv"));
@@ -117,7 +117,7 @@ pub fn throw(device: &Arc<Device>, estimator: Estimator, log2: u32, seed: u32) -
         "the table of kept values must be full"
     );
     let invocations = ((1_u64 << log2) / u64::from(THROWS)) as u32;
-    let pipeline = ComputePipeline::new(
+    let pipeline = Pipeline::compute(
         device,
         &PipelineDesc {
             name: "needle",

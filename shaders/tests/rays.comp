@@ -2,29 +2,8 @@
 // Test kernel: one ray query for each probe ray; primitives of odd number are cut out under HAS_ALPHA.
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_ray_query : require
-#include "layout.glsl"
-#include "spec.glsl"
+#include "tests/rays.glsl"
 
 layout(local_size_x = 64) in;
 
-layout(binding = BIND_PROBE_RAYS, scalar) readonly buffer Rays { ProbeRay rays[]; };
-layout(binding = BIND_PROBE_HITS, scalar) writeonly buffer Hits { ProbeHit hits[]; };
-layout(push_constant) uniform Push { uint count; } push;
-
-struct Hit { float t; vec2 bary; uint instance; uint primitive; uint record; };
-
-bool surface_is_opaque(uint instance, uint primitive, vec2 bary) {
-    return (primitive & 1u) == 0u;
-}
-
-#include "traverse_query.glsl"
-
-void main() {
-    uint i = gl_GlobalInvocationID.x;
-    if (i >= push.count) return;
-    ProbeRay ray = rays[i];
-    Hit hit;
-    if (!trace_closest(ray.origin, ray.direction, ray.t_min, ray.t_max, ray.from, hit)) hit.t = -1.0;
-    bool occluded = trace_occluded(ray.origin, ray.direction, ray.t_min, ray.t_max, ray.from);
-    hits[i] = ProbeHit(hit.t, hit.bary, hit.instance, hit.primitive, hit.record, occluded ? 1u : 0u);
-}
+void main() { rays_trace(gl_GlobalInvocationID.x); }

@@ -244,6 +244,8 @@ pub enum Backend {
     Auto,
     /// The device's ray query (VK_KHR_ray_query)
     RayQuery,
+    /// The device's ray tracing pipeline (VK_KHR_ray_tracing_pipeline)
+    RayPipeline,
     /// Own bounding volume hierarchy in a compute shader; needs no ray tracing hardware
     Bvh,
 }
@@ -253,6 +255,7 @@ impl From<Backend> for BackendChoice {
         match backend {
             Backend::Auto => Self::Auto,
             Backend::RayQuery => Self::RayQuery,
+            Backend::RayPipeline => Self::RayPipeline,
             Backend::Bvh => Self::Bvh,
         }
     }

@@ -154,13 +154,13 @@ fn write_device(text: &mut String, device: &DeviceInfo) {
             device.index, device.name, device.kind, device.api_version, device.subgroup
         ),
     );
-    line(text, &format!("  driver      {}", device.driver));
+    line(text, &format!("  driver       {}", device.driver));
     for (backend, support) in &device.backends {
         let support = match support {
             Ok(()) => String::from("yes"),
             Err(lacks) => format!("no: {lacks}"),
         };
-        line(text, &format!("  {:11} {support}", backend.name()));
+        line(text, &format!("  {:12} {support}", backend.name()));
     }
 }
 

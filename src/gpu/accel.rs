@@ -1,4 +1,4 @@
-//! Acceleration structures: the scene as ray queries see it. A [`Blas`] holds the
+//! Acceleration structures: the scene as rays of the device see it. A [`Blas`] holds the
 //! triangles of one group, a [`Tlas`] places groups in the world. Both are cheap handles.
 
 use std::sync::Arc;
@@ -89,7 +89,7 @@ const _: () = assert!(size_of::<InstanceRecord>() == 64);
 
 impl Blas {
     /// Builds and compacts the structure. Fails with [`Error::Unsupported`] where
-    /// there are more triangles than the device takes or it was opened without ray query.
+    /// there are more triangles than the device takes or it was opened without ray tracing.
     /// Panics where an index or the vertices leave their buffer.
     pub fn build(device: &Arc<Device>, name: &str, geometry: &BlasGeometry<'_>) -> Result<Self> {
         device.acceleration()?;

@@ -91,6 +91,11 @@ impl Usage {
         vk::BufferUsageFlags::STORAGE_BUFFER.as_raw()
             | vk::BufferUsageFlags::SHADER_DEVICE_ADDRESS.as_raw(),
     ));
+    /// Handles of the shaders that rays call.
+    pub const SHADER_TABLE: Self = Self::of(vk::BufferUsageFlags::from_raw(
+        vk::BufferUsageFlags::SHADER_BINDING_TABLE_KHR.as_raw()
+            | vk::BufferUsageFlags::SHADER_DEVICE_ADDRESS.as_raw(),
+    ));
 
     const fn of(flags: vk::BufferUsageFlags) -> Self {
         Self { flags, texel: None }

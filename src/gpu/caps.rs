@@ -52,6 +52,8 @@ pub struct Caps {
     pub compute: Result<(), String>,
     /// Whether acceleration structures and ray queries work as well, else what is missing.
     pub ray_query: Result<(), String>,
+    /// Whether acceleration structures and ray tracing pipelines work as well, else what is missing.
+    pub ray_pipeline: Result<(), String>,
     /// Whether rays are probably traced by circuits: ray query on a device that is no CPU.
     pub ray_hardware_likely: bool,
     /// Largest storage buffer a shader can see, bytes.
@@ -62,12 +64,14 @@ pub struct Caps {
     pub max_texel_elements: u64,
     /// Largest buffer of any use, bytes.
     pub max_buffer_bytes: u64,
-    /// Most triangles of one bottom-level acceleration structure; 0 without ray query.
+    /// Most triangles of one bottom-level acceleration structure; 0 without such.
     pub max_primitives: u64,
-    /// Most instances of one top-level acceleration structure; 0 without ray query.
+    /// Most instances of one top-level acceleration structure; 0 without such.
     pub max_instances: u64,
     /// Most work groups of one dispatch along each axis.
     pub max_groups: [u32; 3],
+    /// Most invocations of one launch of a ray tracing pipeline; 0 without such.
+    pub max_launch: u32,
     /// Most bytes of push constants.
     pub max_push_bytes: u32,
     /// Most storage buffers that one compute stage can bind.
@@ -84,8 +88,18 @@ pub struct Caps {
     pub(super) queue_family: u32,
     /// Alignment of scratch addresses for acceleration-structure builds, bytes.
     pub(super) scratch_alignment: u64,
+    pub(super) ray_pipeline_limits: RayPipelineLimits,
     /// Whether `maintenance4` can be enabled (GLSL's LocalSizeId needs it).
     pub(super) maintenance4: bool,
+}
+
+/// Limits of ray tracing pipelines; 0 without such.
+#[derive(Clone, Debug, Default)]
+pub(super) struct RayPipelineLimits {
+    /// Bytes of a shader group's handle.
+    pub handle_bytes: u32,
+    /// Alignment of shader tables, bytes; strides of records are multiples of it here as well.
+    pub table_alignment: u64,
 }
 
 /// The answers that only a device of version 1.2 gives.
@@ -101,7 +115,10 @@ struct Modern {
     max_primitives: u64,
     max_instances: u64,
     scratch_alignment: u64,
-    missing_for_rays: Vec<&'static str>,
+    ray_pipeline_limits: RayPipelineLimits,
+    max_launch: u32,
+    missing_for_queries: Vec<&'static str>,
+    missing_for_pipelines: Vec<&'static str>,
 }
 
 impl Caps {
@@ -126,13 +143,13 @@ impl Caps {
         };
         let queue = choose_queue(&families);
         let compute = require_compute(properties.api_version, queue.is_some(), &modern);
-        let ray_query = compute.clone().and_then(|()| {
-            if modern.missing_for_rays.is_empty() {
-                Ok(())
-            } else {
-                Err(modern.missing_for_rays.join(", "))
-            }
-        });
+        let able = |missing: &[&str]| match missing {
+            _ if compute.is_err() => compute.clone(),
+            [] => Ok(()),
+            missing => Err(missing.join(", ")),
+        };
+        let ray_query = able(&modern.missing_for_queries);
+        let ray_pipeline = able(&modern.missing_for_pipelines);
         let kind = match properties.device_type {
             vk::PhysicalDeviceType::DISCRETE_GPU => DeviceKind::Discrete,
             vk::PhysicalDeviceType::INTEGRATED_GPU => DeviceKind::Integrated,
@@ -150,6 +167,7 @@ impl Caps {
             ray_hardware_likely: ray_query.is_ok() && kind != DeviceKind::Cpu,
             compute,
             ray_query,
+            ray_pipeline,
             max_storage_range: limits.max_storage_buffer_range.into(),
             max_uniform_range: limits.max_uniform_buffer_range.into(),
             max_texel_elements: limits.max_texel_buffer_elements.into(),
@@ -157,6 +175,10 @@ impl Caps {
             max_primitives: modern.max_primitives,
             max_instances: modern.max_instances,
             max_groups: limits.max_compute_work_group_count,
+            // Along one axis a launch is also bound like a dispatch.
+            max_launch: limits.max_compute_work_group_count[0]
+                .saturating_mul(limits.max_compute_work_group_size[0])
+                .min(modern.max_launch),
             max_push_bytes: limits.max_push_constants_size,
             max_storage_buffers: limits.max_per_stage_descriptor_storage_buffers,
             subgroup_size: modern.subgroup_size,
@@ -170,6 +192,7 @@ impl Caps {
             timestamp_bits,
             queue_family,
             scratch_alignment: modern.scratch_alignment,
+            ray_pipeline_limits: modern.ray_pipeline_limits,
             maintenance4: modern.maintenance4,
         })
     }
@@ -212,10 +235,9 @@ fn require_compute(version: u32, has_queue: bool, modern: &Modern) -> Result<(),
     }
 }
 
-/// Extensions that ray queries in a compute shader need.
-pub(super) const RAY_EXTENSIONS: [&std::ffi::CStr; 3] = [
+/// Extensions that acceleration structures need.
+pub(super) const BUILD_EXTENSIONS: [&std::ffi::CStr; 2] = [
     khr::acceleration_structure::NAME,
-    khr::ray_query::NAME,
     khr::deferred_host_operations::NAME,
 ];
 
@@ -225,60 +247,67 @@ fn query_modern(instance: &Instance, physical: vk::PhysicalDevice, version: u32)
     let extensions = unsafe { raw.enumerate_device_extension_properties(physical) }
         .map_err(failed("list the extensions of a device"))?;
     let has = |name| has_extension(&extensions, name);
-    let has_rays = RAY_EXTENSIONS.iter().all(|&name| has(name));
+    let has_builds = BUILD_EXTENSIONS.iter().all(|&name| has(name));
+    let has_queries = has(khr::ray_query::NAME);
+    let has_pipelines = has(khr::ray_tracing_pipeline::NAME);
     let is_13 = version >= vk::API_VERSION_1_3;
 
     let mut v11 = vk::PhysicalDeviceVulkan11Properties::default();
     let mut v12 = vk::PhysicalDeviceVulkan12Properties::default();
     let mut v13 = vk::PhysicalDeviceVulkan13Properties::default();
-    let mut rays = vk::PhysicalDeviceAccelerationStructurePropertiesKHR::default();
+    let mut builds = vk::PhysicalDeviceAccelerationStructurePropertiesKHR::default();
+    let mut pipelines = vk::PhysicalDeviceRayTracingPipelinePropertiesKHR::default();
     let mut properties = vk::PhysicalDeviceProperties2::default()
         .push_next(&mut v11)
         .push_next(&mut v12);
-    if is_13 {
-        properties = properties.push_next(&mut v13);
-    }
-    if has_rays {
-        properties = properties.push_next(&mut rays);
-    }
-    // SAFETY: every struct in the chain belongs to a version or extension that the device has.
-    unsafe { raw.get_physical_device_properties2(physical, &mut properties) };
-
     let mut f12 = vk::PhysicalDeviceVulkan12Features::default();
     let mut f13 = vk::PhysicalDeviceVulkan13Features::default();
     let mut f_build = vk::PhysicalDeviceAccelerationStructureFeaturesKHR::default();
     let mut f_query = vk::PhysicalDeviceRayQueryFeaturesKHR::default();
+    let mut f_pipeline = vk::PhysicalDeviceRayTracingPipelineFeaturesKHR::default();
     let mut features = vk::PhysicalDeviceFeatures2::default().push_next(&mut f12);
     if is_13 {
+        properties = properties.push_next(&mut v13);
         features = features.push_next(&mut f13);
     }
-    if has_rays {
-        features = features.push_next(&mut f_build).push_next(&mut f_query);
+    if has_builds {
+        properties = properties.push_next(&mut builds);
+        features = features.push_next(&mut f_build);
     }
-    // SAFETY: as above.
-    unsafe { raw.get_physical_device_features2(physical, &mut features) };
+    if has_queries {
+        features = features.push_next(&mut f_query);
+    }
+    if has_pipelines {
+        properties = properties.push_next(&mut pipelines);
+        features = features.push_next(&mut f_pipeline);
+    }
+    // SAFETY: every struct in the chains belongs to a version or extension that the device has.
+    unsafe {
+        raw.get_physical_device_properties2(physical, &mut properties);
+        raw.get_physical_device_features2(physical, &mut features);
+    }
 
+    let is_on = |feature: vk::Bool32| feature == vk::TRUE;
     let mut missing = Vec::new();
-    for name in RAY_EXTENSIONS.into_iter().filter(|&name| !has(name)) {
+    for name in BUILD_EXTENSIONS.into_iter().filter(|&name| !has(name)) {
         missing.push(name.to_str().expect("extension names are ASCII"));
     }
-    for (name, present) in [
-        (
-            "feature accelerationStructure",
-            !has_rays || f_build.acceleration_structure == vk::TRUE,
-        ),
-        (
-            "feature rayQuery",
-            !has_rays || f_query.ray_query == vk::TRUE,
-        ),
-        (
-            "feature bufferDeviceAddress",
-            f12.buffer_device_address == vk::TRUE,
-        ),
-    ] {
-        if !present {
-            missing.push(name);
-        }
+    if has_builds && !is_on(f_build.acceleration_structure) {
+        missing.push("feature accelerationStructure");
+    }
+    if !is_on(f12.buffer_device_address) {
+        missing.push("feature bufferDeviceAddress");
+    }
+    let (mut missing_for_queries, mut missing_for_pipelines) = (missing.clone(), missing);
+    if !has_queries {
+        missing_for_queries.push("VK_KHR_ray_query");
+    } else if !is_on(f_query.ray_query) {
+        missing_for_queries.push("feature rayQuery");
+    }
+    if !has_pipelines {
+        missing_for_pipelines.push("VK_KHR_ray_tracing_pipeline");
+    } else if !is_on(f_pipeline.ray_tracing_pipeline) {
+        missing_for_pipelines.push("feature rayTracingPipeline");
     }
     let max_buffer_bytes = if is_13 {
         v13.max_buffer_size.min(v11.max_memory_allocation_size)
@@ -294,20 +323,30 @@ fn query_modern(instance: &Instance, physical: vk::PhysicalDevice, version: u32)
         driver: driver.trim().to_owned(),
         subgroup_size: v11.subgroup_size,
         max_buffer_bytes,
-        maintenance4: f13.maintenance4 == vk::TRUE,
-        scalar_block_layout: f12.scalar_block_layout == vk::TRUE,
+        maintenance4: is_on(f13.maintenance4),
+        scalar_block_layout: is_on(f12.scalar_block_layout),
         subgroup_operations: v11
             .subgroup_supported_operations
             .contains(vk::SubgroupFeatureFlags::ARITHMETIC | vk::SubgroupFeatureFlags::VOTE)
             && v11
                 .subgroup_supported_stages
                 .contains(vk::ShaderStageFlags::COMPUTE),
-        max_primitives: rays.max_primitive_count,
-        max_instances: rays.max_instance_count,
-        scratch_alignment: rays
+        max_primitives: builds.max_primitive_count,
+        max_instances: builds.max_instance_count,
+        scratch_alignment: builds
             .min_acceleration_structure_scratch_offset_alignment
             .into(),
-        missing_for_rays: missing,
+        ray_pipeline_limits: RayPipelineLimits {
+            handle_bytes: pipelines.shader_group_handle_size,
+            // Both are powers of two, so that the larger is a multiple of the other.
+            table_alignment: pipelines
+                .shader_group_base_alignment
+                .max(pipelines.shader_group_handle_alignment)
+                .into(),
+        },
+        max_launch: pipelines.max_ray_dispatch_invocation_count,
+        missing_for_queries,
+        missing_for_pipelines,
     })
 }
 

@@ -10,7 +10,7 @@ use ash::vk;
 use super::buffer::Buffer;
 use super::device::Device;
 use super::failed;
-use super::pipeline::{BindSet, ComputePipeline};
+use super::pipeline::{BindSet, Pipeline};
 use crate::error::{Error, Result};
 
 /// A fence is waited for in slices of this length, so that a wait shows up in the log.
@@ -67,25 +67,12 @@ impl Commands {
     /// Runs `groups` work groups of the pipeline. `push` must have the length that
     /// the pipeline was made with, and the set must have been made for it.
     /// What was recorded before is finished and visible first.
-    pub fn dispatch(
-        &self,
-        pipeline: &ComputePipeline,
-        set: &BindSet,
-        push: &[u8],
-        groups: [u32; 3],
-    ) {
+    pub fn dispatch(&self, pipeline: &Pipeline, set: &BindSet, push: &[u8], groups: [u32; 3]) {
+        self.check(pipeline, set, push);
         assert!(
-            set.fits(pipeline) && pipeline.is_of(&self.device),
-            "bind set \"{}\" was made for another pipeline than \"{}\"",
-            set.name(),
+            pipeline.table().is_none(),
+            "pipeline \"{}\" traces rays and has no work groups",
             pipeline.name()
-        );
-        assert!(
-            push.len() == pipeline.push_bytes() as usize,
-            "pipeline \"{}\" takes {} bytes of push constants, not {}",
-            pipeline.name(),
-            pipeline.push_bytes(),
-            push.len()
         );
         let limit = self.device.caps().max_groups;
         if (0..3).any(|axis| groups[axis] > limit[axis]) {
@@ -108,6 +95,23 @@ impl Commands {
                 .raw()
                 .cmd_dispatch(self.raw, groups[0], groups[1], groups[2]);
         }
+    }
+
+    /// Panics where the three do not belong together.
+    pub(super) fn check(&self, pipeline: &Pipeline, set: &BindSet, push: &[u8]) {
+        assert!(
+            set.fits(pipeline) && pipeline.is_of(&self.device),
+            "bind set \"{}\" was made for another pipeline than \"{}\"",
+            set.name(),
+            pipeline.name()
+        );
+        assert!(
+            push.len() == pipeline.push_bytes() as usize,
+            "pipeline \"{}\" takes {} bytes of push constants, not {}",
+            pipeline.name(),
+            pipeline.push_bytes(),
+            push.len()
+        );
     }
 
     /// Fills the buffer with zeros.
@@ -181,14 +185,18 @@ impl Commands {
         self.keep.borrow_mut().push(Box::new(object));
     }
 
+    pub(super) fn device(&self) -> &Device {
+        &self.device
+    }
+
     pub(super) fn raw(&self) -> vk::CommandBuffer {
         self.raw
     }
 
     /// Binds a pipeline and what it reads.
-    pub(super) fn bind(&self, pipeline: &ComputePipeline, set: &BindSet, push: &[u8]) {
+    pub(super) fn bind(&self, pipeline: &Pipeline, set: &BindSet, push: &[u8]) {
         let device = self.device.raw();
-        let point = vk::PipelineBindPoint::COMPUTE;
+        let point = pipeline.point();
         // SAFETY: the objects are alive and kept by the caller, the set's layout is the
         // pipeline's, and `push` fills the pipeline's range.
         unsafe {
@@ -196,7 +204,7 @@ impl Commands {
             let sets = [set.raw()];
             device.cmd_bind_descriptor_sets(self.raw, point, pipeline.layout(), 0, &sets, &[]);
             if !push.is_empty() {
-                let stage = vk::ShaderStageFlags::COMPUTE;
+                let stage = pipeline.stages();
                 device.cmd_push_constants(self.raw, pipeline.layout(), stage, 0, push);
             }
         }
@@ -359,7 +367,8 @@ impl Commands {
         }
     }
 
-    fn refuse(&self, error: Error) {
+    /// Makes the submission fail with this error, if it is the first.
+    pub(super) fn refuse(&self, error: Error) {
         self.error.borrow_mut().get_or_insert(error);
     }
 }

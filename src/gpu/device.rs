@@ -7,7 +7,7 @@ use ash::{khr, vk};
 use gpu_allocator::vulkan::{Allocator, AllocatorCreateDesc};
 use gpu_allocator::{AllocationSizes, AllocatorDebugSettings};
 
-use super::caps::{Caps, DeviceKind, RAY_EXTENSIONS};
+use super::caps::{BUILD_EXTENSIONS, Caps, DeviceKind};
 use super::failed;
 use super::instance::{Instance, ValidationLog};
 use crate::error::{Error, Result};
@@ -28,6 +28,14 @@ pub struct DeviceRequest<'a> {
     pub validation: bool,
     /// Enables acceleration structures and ray query.
     pub ray_query: bool,
+    /// Enables acceleration structures and ray tracing pipelines.
+    pub ray_pipeline: bool,
+}
+
+impl DeviceRequest<'_> {
+    fn needs_acceleration(&self) -> bool {
+        self.ray_query || self.ray_pipeline
+    }
 }
 
 /// The devices of this machine in the loader's order. Fails with
@@ -55,6 +63,7 @@ pub struct Device {
     // instance, which it holds. Nothing is in flight by then: `run` has waited.
     allocator: Mutex<Allocator>,
     pub(super) acceleration: Option<khr::acceleration_structure::Device>,
+    ray_pipelines: Option<khr::ray_tracing_pipeline::Device>,
     names: Option<ash::ext::debug_utils::Device>,
     queue: Mutex<vk::Queue>,
     caps: Caps,
@@ -84,7 +93,7 @@ impl Device {
     pub fn open(request: &DeviceRequest<'_>) -> Result<Arc<Self>> {
         let instance = Instance::new(request.validation)?;
         let (physical, caps) = choose(query_all(&instance)?, request)?;
-        let raw = create(&instance, physical, &caps, request.ray_query)?;
+        let raw = create(&instance, physical, &caps, request)?;
         let root = Root { raw, instance };
         let Root { raw, instance } = &root;
 
@@ -95,7 +104,7 @@ impl Device {
             device: raw.clone(),
             physical_device: physical,
             debug_settings: AllocatorDebugSettings::default(),
-            buffer_device_address: request.ray_query,
+            buffer_device_address: request.needs_acceleration(),
             allocation_sizes: AllocationSizes::new(DEVICE_BLOCK_BYTES, HOST_BLOCK_BYTES),
         })
         .map_err(|error| Error::Unsupported {
@@ -106,8 +115,11 @@ impl Device {
         Ok(Arc::new(Self {
             allocator: Mutex::new(allocator),
             acceleration: request
-                .ray_query
+                .needs_acceleration()
                 .then(|| khr::acceleration_structure::Device::new(&instance.raw, raw)),
+            ray_pipelines: request
+                .ray_pipeline
+                .then(|| khr::ray_tracing_pipeline::Device::new(&instance.raw, raw)),
             names: instance
                 .debug_utils
                 .then(|| ash::ext::debug_utils::Device::new(&instance.raw, raw)),
@@ -142,7 +154,17 @@ impl Device {
             .as_ref()
             .ok_or_else(|| Error::Unsupported {
                 what: String::from("acceleration structures"),
-                missing: format!("{} was opened without ray query", self.caps.name),
+                missing: format!("{} was opened without ray tracing", self.caps.name),
+            })
+    }
+
+    /// The functions of VK_KHR_ray_tracing_pipeline, or why there are none.
+    pub(super) fn ray_pipelines(&self) -> Result<&khr::ray_tracing_pipeline::Device> {
+        self.ray_pipelines
+            .as_ref()
+            .ok_or_else(|| Error::Unsupported {
+                what: String::from("ray tracing pipelines"),
+                missing: format!("{} was opened without them", self.caps.name),
             })
     }
 
@@ -173,12 +195,14 @@ impl Device {
 
 /// What keeps a device from serving the request, if anything does.
 fn obstacle(caps: &Caps, request: &DeviceRequest<'_>) -> Option<String> {
-    let needed = if request.ray_query {
-        &caps.ray_query
-    } else {
-        &caps.compute
-    };
-    needed.clone().err()
+    let mut needed = vec![&caps.compute];
+    if request.ray_query {
+        needed.push(&caps.ray_query);
+    }
+    if request.ray_pipeline {
+        needed.push(&caps.ray_pipeline);
+    }
+    needed.into_iter().find_map(|able| able.clone().err())
 }
 
 fn choose(
@@ -187,6 +211,8 @@ fn choose(
 ) -> Result<(vk::PhysicalDevice, Caps)> {
     let what = if request.ray_query {
         "a device with ray query"
+    } else if request.ray_pipeline {
+        "a device with ray tracing pipelines"
     } else {
         "a device"
     };
@@ -248,31 +274,42 @@ fn create(
     instance: &Instance,
     physical: vk::PhysicalDevice,
     caps: &Caps,
-    ray_query: bool,
+    request: &DeviceRequest<'_>,
 ) -> Result<ash::Device> {
     let queues = [vk::DeviceQueueCreateInfo::default()
         .queue_family_index(caps.queue_family)
         .queue_priorities(&[1.0])];
-    let extensions: Vec<_> = RAY_EXTENSIONS.iter().map(|name| name.as_ptr()).collect();
+    let mut extensions = Vec::new();
+    if request.needs_acceleration() {
+        extensions.extend(BUILD_EXTENSIONS.map(std::ffi::CStr::as_ptr));
+    }
     let mut f12 = vk::PhysicalDeviceVulkan12Features::default()
         .scalar_block_layout(true)
-        .buffer_device_address(ray_query);
+        .buffer_device_address(request.needs_acceleration());
     let mut f13 = vk::PhysicalDeviceVulkan13Features::default().maintenance4(true);
     let mut f_build =
         vk::PhysicalDeviceAccelerationStructureFeaturesKHR::default().acceleration_structure(true);
     let mut f_query = vk::PhysicalDeviceRayQueryFeaturesKHR::default().ray_query(true);
+    let mut f_pipeline =
+        vk::PhysicalDeviceRayTracingPipelineFeaturesKHR::default().ray_tracing_pipeline(true);
     let mut info = vk::DeviceCreateInfo::default()
         .queue_create_infos(&queues)
         .push_next(&mut f12);
     if caps.maintenance4 {
         info = info.push_next(&mut f13);
     }
-    if ray_query {
-        info = info
-            .enabled_extension_names(&extensions)
-            .push_next(&mut f_build)
-            .push_next(&mut f_query);
+    if request.needs_acceleration() {
+        info = info.push_next(&mut f_build);
     }
+    if request.ray_query {
+        extensions.push(khr::ray_query::NAME.as_ptr());
+        info = info.push_next(&mut f_query);
+    }
+    if request.ray_pipeline {
+        extensions.push(khr::ray_tracing_pipeline::NAME.as_ptr());
+        info = info.push_next(&mut f_pipeline);
+    }
+    info = info.enabled_extension_names(&extensions);
     // SAFETY: `choose` has made sure that the device has all features and extensions asked for.
     unsafe { instance.raw.create_device(physical, &info, None) }
         .map_err(failed(format!("open device \"{}\"", caps.name)))

@@ -9,7 +9,7 @@ use super::buffer::Buffer;
 use super::commands::Commands;
 use super::device::Device;
 use super::failed;
-use super::pipeline::{BindSet, ComputePipeline};
+use super::pipeline::{BindSet, Pipeline};
 use crate::error::Result;
 
 /// A copy that reads what a fill wrote, with no barrier between them. (Between
@@ -33,7 +33,7 @@ pub fn missing_barrier(device: &Arc<Device>, source: &Buffer, target: &Buffer) -
 /// More work groups than the device runs.
 pub fn too_many_groups(
     device: &Arc<Device>,
-    pipeline: &ComputePipeline,
+    pipeline: &Pipeline,
     set: &BindSet,
     push: &[u8],
 ) -> Result<()> {

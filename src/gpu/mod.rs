@@ -1,4 +1,4 @@
-//! Vulkan, owned: devices, buffers, compute pipelines, acceleration structures.
+//! Vulkan, owned: devices, buffers, pipelines, acceleration structures.
 //! Knows nothing of scenes or light; the renderer hands it plain data.
 //!
 //! The safety policy. This folder is the only one where `unsafe` is allowed;
@@ -13,7 +13,7 @@
 //! 4. **Sizes, kinds and limits are checked here.** A limit that depends on the
 //!    user's data is an `Err` that states the figure; a wrong argument of a caller
 //!    (a missing binding, a range past the end) is a panic that says which.
-//! 5. **Shaders are trusted.** The SPIR-V given to [`ComputePipeline::new`] is
+//! 5. **Shaders are trusted.** The SPIR-V given to [`Pipeline`] is
 //!    compiled by this crate's build script; that it stays within its buffers is
 //!    proved by tests and validation, not by this module.
 #![allow(
@@ -30,6 +30,7 @@ mod device;
 pub mod faults;
 mod instance;
 mod pipeline;
+mod rays;
 
 pub use accel::{Blas, BlasGeometry, Tlas, TlasInstance};
 pub use buffer::{Buffer, Memory, TexelFormat, Usage};
@@ -37,7 +38,8 @@ pub use caps::{Caps, DeviceKind};
 pub use commands::{Commands, GpuTime};
 pub use device::{Device, DeviceRequest, enumerate};
 pub use instance::ValidationLog;
-pub use pipeline::{BindSet, BindingKind, ComputePipeline, PipelineDesc, Resource};
+pub use pipeline::{BindSet, BindingKind, Pipeline, PipelineDesc, Resource};
+pub use rays::RayStages;
 
 /// Turns Vulkan's code into the library's error; `op` says what was attempted.
 fn failed(op: impl Into<String>) -> impl FnOnce(ash::vk::Result) -> crate::Error {

@@ -1,5 +1,5 @@
-//! Compute pipelines and the sets of resources they read: made from plain lists
-//! of bindings and constants. Both are cheap handles.
+//! Pipelines and the sets of resources they read: made from plain lists of bindings
+//! and constants. Both are cheap handles. What rays need besides is in `rays`.
 
 use std::sync::Arc;
 
@@ -9,6 +9,7 @@ use super::accel::Tlas;
 use super::buffer::Buffer;
 use super::device::Device;
 use super::failed;
+use super::rays::ShaderTable;
 use crate::error::{Error, Result};
 
 /// What a shader expects at a binding.
@@ -51,7 +52,7 @@ pub enum Resource<'a> {
     Acceleration(&'a Tlas),
 }
 
-/// A compute pipeline to be made.
+/// A pipeline to be made.
 #[derive(Clone, Copy, Debug)]
 pub struct PipelineDesc<'a> {
     /// For messages and debuggers.
@@ -66,18 +67,22 @@ pub struct PipelineDesc<'a> {
     pub push_bytes: u32,
 }
 
-/// A compiled compute shader; clones share it.
+/// A compiled compute shader, or a ray generation shader with what it calls; clones share it.
 #[derive(Clone)]
-pub struct ComputePipeline(Arc<PipelineInner>);
+pub struct Pipeline(Arc<PipelineInner>);
 
-struct PipelineInner {
+pub(super) struct PipelineInner {
     device: Arc<Device>,
     name: String,
     set_layout: vk::DescriptorSetLayout,
-    layout: vk::PipelineLayout,
-    raw: vk::Pipeline,
+    pub(super) layout: vk::PipelineLayout,
+    pub(super) raw: vk::Pipeline,
     bindings: Vec<(u32, BindingKind)>,
     push_bytes: u32,
+    /// That read bindings and push constants.
+    stages: vk::ShaderStageFlags,
+    /// Only of pipelines that trace rays.
+    pub(super) table: Option<ShaderTable>,
 }
 
 impl Drop for PipelineInner {
@@ -93,7 +98,7 @@ impl Drop for PipelineInner {
 }
 
 /// A shader module for the time of a pipeline's creation.
-struct Module<'a> {
+pub(super) struct Module<'a> {
     device: &'a Device,
     raw: vk::ShaderModule,
 }
@@ -105,26 +110,62 @@ impl Drop for Module<'_> {
     }
 }
 
-impl ComputePipeline {
-    /// Compiles the pipeline. Fails with [`Error::Unsupported`] where the device
-    /// cannot bind so much, and with [`Error::Vulkan`] where the driver refuses.
-    pub fn new(device: &Arc<Device>, desc: &PipelineDesc<'_>) -> Result<Self> {
-        check_limits(device, desc)?;
-        let mut inner = PipelineInner {
-            device: Arc::clone(device),
-            name: desc.name.to_owned(),
-            set_layout: vk::DescriptorSetLayout::null(),
-            layout: vk::PipelineLayout::null(),
-            raw: vk::Pipeline::null(),
-            bindings: desc.bindings.to_vec(),
-            push_bytes: desc.push_bytes,
+impl<'a> Module<'a> {
+    pub(super) fn new(device: &'a Device, spirv: &[u32]) -> Result<Self, vk::Result> {
+        let info = vk::ShaderModuleCreateInfo::default().code(spirv);
+        // SAFETY: the module is trusted (see the safety policy in mod.rs).
+        let raw = unsafe { device.raw().create_shader_module(&info, None) }?;
+        Ok(Self { device, raw })
+    }
+
+    pub(super) fn entry<'b>(
+        &self,
+        stage: vk::ShaderStageFlags,
+        constants: &'b vk::SpecializationInfo<'b>,
+    ) -> vk::PipelineShaderStageCreateInfo<'b> {
+        vk::PipelineShaderStageCreateInfo::default()
+            .stage(stage)
+            .module(self.raw)
+            .name(c"main")
+            .specialization_info(constants)
+    }
+}
+
+/// Specialisation constants as Vulkan reads them. A module ignores those that it lacks.
+pub(super) struct Constants {
+    entries: Vec<vk::SpecializationMapEntry>,
+    values: Vec<u32>,
+}
+
+impl Constants {
+    pub(super) fn new(constants: &[(u32, u32)]) -> Self {
+        let entry = |(index, &(id, _)): (u32, &(u32, u32))| vk::SpecializationMapEntry {
+            constant_id: id,
+            offset: index * 4,
+            size: 4,
         };
+        Self {
+            entries: (0..).zip(constants).map(entry).collect(),
+            values: constants.iter().map(|&(_, value)| value).collect(),
+        }
+    }
+
+    pub(super) fn info(&self) -> vk::SpecializationInfo<'_> {
+        vk::SpecializationInfo::default()
+            .map_entries(&self.entries)
+            .data(bytemuck::cast_slice(&self.values))
+    }
+}
+
+impl Pipeline {
+    /// Compiles a compute shader. Fails with [`Error::Unsupported`] where the device
+    /// cannot bind so much, and with [`Error::Vulkan`] where the driver refuses.
+    pub fn compute(device: &Arc<Device>, desc: &PipelineDesc<'_>) -> Result<Self> {
+        let mut inner = PipelineInner::new(device, desc, vk::ShaderStageFlags::COMPUTE)?;
         inner
-            .create_layouts()
-            .and_then(|()| inner.compile(desc))
+            .compile(desc)
             .map_err(failed(format!("create pipeline \"{}\"", desc.name)))?;
-        device.set_name(inner.raw, desc.name);
-        Ok(Self(Arc::new(inner)))
+        Ok(inner.finish())
     }
 
     pub(super) fn raw(&self) -> vk::Pipeline {
@@ -137,6 +178,21 @@ impl ComputePipeline {
 
     pub(super) fn name(&self) -> &str {
         &self.0.name
+    }
+
+    pub(super) fn stages(&self) -> vk::ShaderStageFlags {
+        self.0.stages
+    }
+
+    pub(super) fn point(&self) -> vk::PipelineBindPoint {
+        match &self.0.table {
+            None => vk::PipelineBindPoint::COMPUTE,
+            Some(_) => vk::PipelineBindPoint::RAY_TRACING_KHR,
+        }
+    }
+
+    pub(super) fn table(&self) -> Option<&ShaderTable> {
+        self.0.table.as_ref()
     }
 
     pub(super) fn push_bytes(&self) -> u32 {
@@ -186,9 +242,37 @@ fn check_limits(device: &Device, desc: &PipelineDesc<'_>) -> Result<()> {
 }
 
 impl PipelineInner {
+    /// A pipeline that has its layouts, to be compiled.
+    pub(super) fn new(
+        device: &Arc<Device>,
+        desc: &PipelineDesc<'_>,
+        stages: vk::ShaderStageFlags,
+    ) -> Result<Self> {
+        check_limits(device, desc)?;
+        let mut inner = Self {
+            device: Arc::clone(device),
+            name: desc.name.to_owned(),
+            set_layout: vk::DescriptorSetLayout::null(),
+            layout: vk::PipelineLayout::null(),
+            raw: vk::Pipeline::null(),
+            bindings: desc.bindings.to_vec(),
+            push_bytes: desc.push_bytes,
+            stages,
+            table: None,
+        };
+        inner
+            .create_layouts()
+            .map_err(failed(format!("create pipeline \"{}\"", desc.name)))?;
+        Ok(inner)
+    }
+
+    pub(super) fn finish(self) -> Pipeline {
+        self.device.set_name(self.raw, &self.name);
+        Pipeline(Arc::new(self))
+    }
+
     fn create_layouts(&mut self) -> Result<(), vk::Result> {
         let device = self.device.raw();
-        let stage = vk::ShaderStageFlags::COMPUTE;
         let bindings: Vec<_> = self
             .bindings
             .iter()
@@ -197,14 +281,14 @@ impl PipelineInner {
                     .binding(binding)
                     .descriptor_type(kind.vulkan())
                     .descriptor_count(1)
-                    .stage_flags(stage)
+                    .stage_flags(self.stages)
             })
             .collect();
         let info = vk::DescriptorSetLayoutCreateInfo::default().bindings(&bindings);
         // SAFETY: the description is plain data that outlives the call.
         self.set_layout = unsafe { device.create_descriptor_set_layout(&info, None) }?;
         let ranges = [vk::PushConstantRange::default()
-            .stage_flags(stage)
+            .stage_flags(self.stages)
             .size(self.push_bytes)];
         let layouts = [self.set_layout];
         let mut info = vk::PipelineLayoutCreateInfo::default().set_layouts(&layouts);
@@ -218,34 +302,15 @@ impl PipelineInner {
 
     fn compile(&mut self, desc: &PipelineDesc<'_>) -> Result<(), vk::Result> {
         let device = self.device.raw();
-        let info = vk::ShaderModuleCreateInfo::default().code(desc.spirv);
-        let module = Module {
-            device: &self.device,
-            // SAFETY: the module is trusted (see the safety policy in mod.rs).
-            raw: unsafe { device.create_shader_module(&info, None) }?,
-        };
-        let entries: Vec<_> = (0..)
-            .zip(desc.constants)
-            .map(|(index, &(id, _))| vk::SpecializationMapEntry {
-                constant_id: id,
-                offset: index * 4,
-                size: 4,
-            })
-            .collect();
-        let values: Vec<u32> = desc.constants.iter().map(|&(_, value)| value).collect();
-        let constants = vk::SpecializationInfo::default()
-            .map_entries(&entries)
-            .data(bytemuck::cast_slice(&values));
-        let stage = vk::PipelineShaderStageCreateInfo::default()
-            .stage(vk::ShaderStageFlags::COMPUTE)
-            .module(module.raw)
-            .name(c"main")
-            .specialization_info(&constants);
+        let module = Module::new(&self.device, desc.spirv)?;
+        let constants = Constants::new(desc.constants);
+        let specialisation = constants.info();
+        let stage = module.entry(vk::ShaderStageFlags::COMPUTE, &specialisation);
         let info = vk::ComputePipelineCreateInfo::default()
             .stage(stage)
             .layout(self.layout);
         let cache = vk::PipelineCache::null();
-        // SAFETY: layout and module are alive and the map entries lie within `values`.
+        // SAFETY: layout and module are alive and the map entries lie within the constants.
         let result = unsafe { device.create_compute_pipelines(cache, &[info], None) };
         self.raw = result.map_err(|(_, result)| result)?[0];
         Ok(())
@@ -257,7 +322,7 @@ impl PipelineInner {
 pub struct BindSet(Arc<SetInner>);
 
 struct SetInner {
-    pipeline: ComputePipeline,
+    pipeline: Pipeline,
     name: String,
     pool: vk::DescriptorPool,
     raw: vk::DescriptorSet,
@@ -282,11 +347,7 @@ impl Drop for SetInner {
 impl BindSet {
     /// Points every binding of the pipeline to a resource. Panics where a binding
     /// is missing, unknown, or of another kind than the resource.
-    pub fn new(
-        pipeline: &ComputePipeline,
-        name: &str,
-        resources: &[(u32, Resource<'_>)],
-    ) -> Result<Self> {
+    pub fn new(pipeline: &Pipeline, name: &str, resources: &[(u32, Resource<'_>)]) -> Result<Self> {
         let bindings = &pipeline.0.bindings;
         for &(binding, _) in resources {
             assert!(
@@ -328,7 +389,7 @@ impl BindSet {
         &self.0.name
     }
 
-    pub(super) fn fits(&self, pipeline: &ComputePipeline) -> bool {
+    pub(super) fn fits(&self, pipeline: &Pipeline) -> bool {
         Arc::ptr_eq(&self.0.pipeline.0, &pipeline.0)
     }
 }

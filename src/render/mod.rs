@@ -313,6 +313,7 @@ pub fn devices() -> Result<Vec<DeviceInfo>> {
             api_version: format!("{major}.{minor}.{patch}"),
             backends: vec![
                 (BackendChoice::RayQuery, caps.ray_query),
+                (BackendChoice::RayPipeline, caps.ray_pipeline),
                 (BackendChoice::Bvh, caps.compute),
             ],
             subgroup: caps.subgroup_size,

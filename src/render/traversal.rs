@@ -1,5 +1,5 @@
-//! The two ways to answer "what does this ray meet?": our own tree, or the
-//! device's ray query. They differ in what is built, bound and compiled.
+//! The ways to answer "what does this ray meet?": our own tree, or the device's ray
+//! query or ray tracing pipeline. They differ in what is built, bound, compiled and launched.
 
 use std::sync::Arc;
 
@@ -9,9 +9,15 @@ use super::upload::SceneData;
 use super::vulkan::{RECORDS, texel};
 use crate::bvh::{Bvh, GroupDesc, InstanceDesc, Quality};
 use crate::error::Result;
-use crate::gpu::{BindingKind, Blas, BlasGeometry, Buffer, Device, Resource, Tlas, TlasInstance};
+use crate::gpu::{
+    BindSet, BindingKind, Blas, BlasGeometry, Buffer, Commands, Device, Pipeline, PipelineDesc,
+    RayStages, Resource, Tlas, TlasInstance,
+};
 use crate::layout;
-use crate::spec::{Kernel, kernels};
+use crate::spec::{Kernel, Spec, kernels};
+
+/// Invocations of a work group in both kernels: INVOCATION_GROUP of invocation.glsl.
+pub(super) const GROUP: u32 = 64;
 
 /// The own tree of a scene.
 pub(super) fn build_bvh(data: &SceneData) -> Result<Bvh> {
@@ -75,6 +81,7 @@ fn world_from_object(record: &layout::Instance) -> [[f32; 3]; 4] {
 pub(super) enum Traversal {
     Software { nodes: Buffer, records: Buffer },
     Query { scene: Tlas, bytes: u64 },
+    Pipeline { scene: Tlas, bytes: u64 },
 }
 
 impl Traversal {
@@ -85,7 +92,9 @@ impl Traversal {
                 (layout::BIND_BVH_NODES, BindingKind::Texel),
                 (layout::BIND_BVH_TRIANGLES, BindingKind::Texel),
             ],
-            Self::Query { .. } => vec![(layout::BIND_SCENE, BindingKind::AccelerationStructure)],
+            Self::Query { .. } | Self::Pipeline { .. } => {
+                vec![(layout::BIND_SCENE, BindingKind::AccelerationStructure)]
+            }
         }
     }
 
@@ -96,23 +105,90 @@ impl Traversal {
                 (layout::BIND_BVH_NODES, Resource::Buffer(nodes)),
                 (layout::BIND_BVH_TRIANGLES, Resource::Buffer(records)),
             ],
-            Self::Query { scene, .. } => vec![(layout::BIND_SCENE, Resource::Acceleration(scene))],
+            Self::Query { scene, .. } | Self::Pipeline { scene, .. } => {
+                vec![(layout::BIND_SCENE, Resource::Acceleration(scene))]
+            }
         }
     }
 
-    /// The kernel that renders.
-    pub fn path_kernel(&self) -> Kernel {
-        match self {
+    /// Compiles the kernel that renders.
+    pub fn path_pipeline(
+        &self,
+        device: &Arc<Device>,
+        spec: &Spec,
+        bindings: &[(u32, BindingKind)],
+    ) -> Result<Pipeline> {
+        let kernel = match self {
             Self::Software { .. } => kernels::PATH_SOFTWARE,
             Self::Query { .. } => kernels::PATH_QUERY,
-        }
+            Self::Pipeline { .. } => kernels::PATH_PIPELINE,
+        };
+        self.pipeline(device, "path", kernel, spec, bindings)
     }
 
-    /// The kernel that answers given rays.
-    pub fn probe_kernel(&self) -> Kernel {
-        match self {
+    /// Compiles the kernel that answers given rays.
+    pub fn probe_pipeline(
+        &self,
+        device: &Arc<Device>,
+        spec: &Spec,
+        bindings: &[(u32, BindingKind)],
+    ) -> Result<Pipeline> {
+        let kernel = match self {
             Self::Software { .. } => kernels::PROBE_SOFTWARE,
             Self::Query { .. } => kernels::PROBE_QUERY,
+            Self::Pipeline { .. } => kernels::PROBE_PIPELINE,
+        };
+        self.pipeline(device, "probe", kernel, spec, bindings)
+    }
+
+    fn pipeline(
+        &self,
+        device: &Arc<Device>,
+        name: &str,
+        kernel: Kernel,
+        spec: &Spec,
+        bindings: &[(u32, BindingKind)],
+    ) -> Result<Pipeline> {
+        let desc = PipelineDesc {
+            name,
+            spirv: &kernel.words(),
+            bindings,
+            constants: &spec.constants(),
+            push_bytes: size_of::<layout::Batch>() as u32,
+        };
+        let Self::Pipeline { .. } = self else {
+            return Pipeline::compute(device, &desc);
+        };
+        // A hit group without it lets the driver leave out what asks.
+        let any_hit = spec
+            .has_candidates()
+            .then(|| kernels::TRACE_ANY_HIT.words());
+        let stages = RayStages {
+            miss: &kernels::TRACE_MISS.words(),
+            closest_hit: &kernels::TRACE_CLOSEST_HIT.words(),
+            any_hit: any_hit.as_deref(),
+        };
+        Pipeline::rays(device, &desc, &stages)
+    }
+
+    /// Runs work groups of a kernel, or as many invocations where there are no groups.
+    pub fn launch(
+        &self,
+        commands: &Commands,
+        pipeline: &Pipeline,
+        set: &BindSet,
+        push: &layout::Batch,
+        groups: u32,
+    ) {
+        let push = bytemuck::bytes_of(push);
+        match self {
+            Self::Software { .. } | Self::Query { .. } => {
+                commands.dispatch(pipeline, set, push, [groups, 1, 1]);
+            }
+            // A count that does not fit is beyond every device's limit.
+            Self::Pipeline { .. } => {
+                commands.trace(pipeline, set, push, groups.saturating_mul(GROUP));
+            }
         }
     }
 
@@ -120,7 +196,7 @@ impl Traversal {
     pub fn bytes(&self) -> u64 {
         match self {
             Self::Software { nodes, records } => nodes.bytes() + records.bytes(),
-            Self::Query { bytes, .. } => *bytes,
+            Self::Query { bytes, .. } | Self::Pipeline { bytes, .. } => *bytes,
         }
     }
 }
@@ -133,12 +209,12 @@ pub(super) fn upload_bvh(device: &Arc<Device>, bvh: &Bvh) -> Result<Traversal> {
     })
 }
 
-/// The device's own acceleration structures over `vertices`, two texels each.
-pub(super) fn build_query(
+/// The device's own acceleration structures over `vertices`, two texels each, with their size in bytes.
+pub(super) fn build_scene(
     device: &Arc<Device>,
     data: &SceneData,
     vertices: &Buffer,
-) -> Result<Traversal> {
+) -> Result<(Tlas, u64)> {
     let geometry = &data.geometry;
     let mut bytes = 0;
     let mut groups = Vec::with_capacity(geometry.groups.len());
@@ -172,5 +248,5 @@ pub(super) fn build_query(
         .collect();
     let scene = Tlas::build(device, "scene", &instances)?;
     bytes += scene.bytes();
-    Ok(Traversal::Query { scene, bytes })
+    Ok((scene, bytes))
 }

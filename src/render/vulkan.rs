@@ -1,16 +1,16 @@
-//! The Vulkan side of a render: buffers, pipeline, batches. What the two
+//! The Vulkan side of a render: buffers, pipeline, batches. What the
 //! traversals do not share is in `traversal`.
 
 use std::ops::Range;
 use std::sync::Arc;
 
-use super::traversal::{Traversal, build_bvh, build_query, upload_bvh};
+use super::traversal::{GROUP, Traversal, build_bvh, build_scene, upload_bvh};
 use super::upload::SceneData;
 use super::{DeviceOptions, Ledger, Memory};
 use crate::error::{Error, Result};
 use crate::gpu::{
-    self, BindSet, BindingKind, Buffer, ComputePipeline, Device, DeviceKind, DeviceRequest,
-    PipelineDesc, Resource, TexelFormat, Usage,
+    self, BindSet, BindingKind, Buffer, Device, DeviceKind, DeviceRequest, Pipeline, Resource,
+    TexelFormat, Usage,
 };
 use crate::layout::{self, ProbeHit, ProbeRay};
 use crate::settings::BackendChoice;
@@ -18,46 +18,37 @@ use crate::spec;
 
 /// Records that mix integers and floats are read as integers, whose bits no device changes.
 pub(super) const RECORDS: TexelFormat = TexelFormat::Rgba32Uint;
-/// Invocations of a probe's work group.
-const PROBE_GROUP: u32 = 64;
 
 /// Opens the device that can run the choice; says which traversal and why.
 pub(super) fn open(
     choice: BackendChoice,
     options: &DeviceOptions,
 ) -> Result<(Arc<Device>, BackendChoice, String)> {
-    let request = |ray_query| DeviceRequest {
+    let request = |choice| DeviceRequest {
         select: options.device.as_deref(),
         validation: options.validation,
-        ray_query,
+        ray_query: choice == BackendChoice::RayQuery,
+        ray_pipeline: choice == BackendChoice::RayPipeline,
     };
-    match choice {
-        BackendChoice::RayQuery => Ok((
-            Device::open(&request(true))?,
-            BackendChoice::RayQuery,
-            String::from("as asked"),
-        )),
-        BackendChoice::Bvh => Ok((
-            Device::open(&request(false))?,
-            BackendChoice::Bvh,
-            String::from("as asked"),
-        )),
-        BackendChoice::Auto => {
-            let device = Device::open(&request(false))?;
-            let caps = device.caps();
-            if caps.ray_hardware_likely {
-                drop(device);
-                let device = Device::open(&request(true))?;
-                let reason = String::from("the device has ray query in hardware");
-                return Ok((device, BackendChoice::RayQuery, reason));
-            }
-            let reason = match &caps.ray_query {
-                Err(missing) => format!("the device lacks {missing}"),
-                Ok(()) => String::from("ray query on a CPU is slower than our own tree"),
-            };
-            Ok((device, BackendChoice::Bvh, reason))
-        }
+    let device = Device::open(&request(choice))?;
+    if choice != BackendChoice::Auto {
+        return Ok((device, choice, String::from("as asked")));
     }
+    let caps = device.caps();
+    if caps.ray_hardware_likely {
+        drop(device);
+        let device = Device::open(&request(BackendChoice::RayQuery))?;
+        let reason = String::from("the device has ray query in hardware");
+        return Ok((device, BackendChoice::RayQuery, reason));
+    }
+    let reason = match (&caps.ray_query, &caps.ray_pipeline) {
+        (Ok(()), _) => String::from("ray query on a CPU is slower than our own tree"),
+        (Err(missing), Ok(())) => format!(
+            "the device lacks {missing}; ray tracing pipelines alone mean that its driver traces without circuits"
+        ),
+        (Err(missing), Err(_)) => format!("the device lacks {missing}"),
+    };
+    Ok((device, BackendChoice::Bvh, reason))
 }
 
 /// Rows of tiles whose film fits one buffer.
@@ -87,7 +78,7 @@ pub(super) struct VulkanBackend {
     shared: Vec<(u32, BindingKind, Buffer)>,
     film: Buffer,
     ledger: Buffer,
-    pipeline: ComputePipeline,
+    pipeline: Pipeline,
     set: BindSet,
     workers: u32,
     memory: Memory,
@@ -102,10 +93,17 @@ impl VulkanBackend {
             "vertices",
             TexelFormat::Rgba32Float,
             &data.geometry.vertices,
-            choice == BackendChoice::RayQuery,
+            choice != BackendChoice::Bvh,
         )?;
         let traversal = match choice {
-            BackendChoice::RayQuery => build_query(device, data, &vertices)?,
+            BackendChoice::RayQuery => {
+                let (scene, bytes) = build_scene(device, data, &vertices)?;
+                Traversal::Query { scene, bytes }
+            }
+            BackendChoice::RayPipeline => {
+                let (scene, bytes) = build_scene(device, data, &vertices)?;
+                Traversal::Pipeline { scene, bytes }
+            }
             _ => {
                 let bvh = build_bvh(data)?;
                 params.bvh_root = bvh.root;
@@ -212,16 +210,7 @@ impl VulkanBackend {
         let mut bindings: Vec<_> = shared.iter().map(|(at, kind, _)| (*at, *kind)).collect();
         bindings.extend([(layout::BIND_FILM, storage), (layout::BIND_LEDGER, storage)]);
         bindings.extend(traversal.bindings());
-        let pipeline = ComputePipeline::new(
-            device,
-            &PipelineDesc {
-                name: "path",
-                spirv: &traversal.path_kernel().words(),
-                bindings: &bindings,
-                constants: &data.spec.constants(),
-                push_bytes: size_of::<layout::Batch>() as u32,
-            },
-        )?;
+        let pipeline = traversal.path_pipeline(device, &data.spec, &bindings)?;
         let mut resources: Vec<_> = shared
             .iter()
             .map(|(at, _, buffer)| (*at, Resource::Buffer(buffer)))
@@ -328,12 +317,8 @@ impl VulkanBackend {
         };
         let groups = count.div_ceil(self.workers) * self.workers;
         let time = self.device.run("path", |commands| {
-            commands.dispatch(
-                &self.pipeline,
-                &self.set,
-                bytemuck::bytes_of(&push),
-                [groups, 1, 1],
-            );
+            self.traversal
+                .launch(commands, &self.pipeline, &self.set, &push, groups);
         })?;
         Ok(time.wall)
     }
@@ -376,16 +361,8 @@ impl VulkanBackend {
             (layout::BIND_PROBE_HITS, storage),
         ]);
         bindings.extend(self.traversal.bindings());
-        let pipeline = ComputePipeline::new(
-            &self.device,
-            &PipelineDesc {
-                name: "probe",
-                spirv: &self.traversal.probe_kernel().words(),
-                bindings: &bindings,
-                constants: &self.spec.constants(),
-                push_bytes: size_of::<layout::Batch>() as u32,
-            },
-        )?;
+        let traversal = &self.traversal;
+        let pipeline = traversal.probe_pipeline(&self.device, &self.spec, &bindings)?;
         let input = upload(&self.device, "probe rays", rays)?;
         let output = Buffer::new(
             &self.device,
@@ -409,9 +386,9 @@ impl VulkanBackend {
             sample_count: rays.len() as u32,
             ..Default::default()
         };
-        let groups = (rays.len() as u32).div_ceil(PROBE_GROUP);
+        let groups = (rays.len() as u32).div_ceil(GROUP);
         self.device.run("probe", |commands| {
-            commands.dispatch(&pipeline, &set, bytemuck::bytes_of(&push), [groups, 1, 1]);
+            traversal.launch(commands, &pipeline, &set, &push, groups);
         })?;
         output.read(rays.len())
     }

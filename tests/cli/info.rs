@@ -18,7 +18,7 @@ fn info_describes_devices_and_scenes() {
     for name in ["name", "kind", "driver", "api_version"] {
         assert!(!device[name].as_str().unwrap().is_empty(), "{name}");
     }
-    for backend in ["ray-query", "bvh"] {
+    for backend in ["ray-query", "ray-pipeline", "bvh"] {
         let support = &device["backends"][backend];
         // what is not available says why
         assert_eq!(

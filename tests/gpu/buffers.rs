@@ -67,7 +67,7 @@ fn limits_are_errors_with_the_figure() {
     assert!(message.contains(&texels.to_string()));
     assert!(refuse(u64::MAX, Usage::TRANSFER).contains(&caps.max_buffer_bytes.to_string()));
     // Acceleration structures need a device that was opened for them.
-    assert!(refuse(64, Usage::ACCELERATION_INPUT).contains("without ray query"));
+    assert!(refuse(64, Usage::ACCELERATION_INPUT).contains("without ray tracing"));
 
     let kernel = Kernel::new(&device, 4);
     let groups = [1, caps.max_groups[1].saturating_add(1), 1];

@@ -3,8 +3,8 @@
 use std::sync::Arc;
 
 use etendue::gpu::{
-    BindSet, BindingKind, Buffer, ComputePipeline, Device, Memory, PipelineDesc, Resource,
-    TexelFormat, Usage,
+    BindSet, BindingKind, Buffer, Device, Memory, Pipeline, PipelineDesc, Resource, TexelFormat,
+    Usage,
 };
 
 use crate::{GROUP, finish, open};
@@ -13,7 +13,7 @@ const RESOURCES: &[u8] = include_bytes!(concat!(env!("OUT_DIR"), "/test_resource
 
 /// `resources.comp` with inputs of `count` elements.
 pub struct Kernel {
-    pub pipeline: ComputePipeline,
+    pub pipeline: Pipeline,
     pub set: BindSet,
     pub sums: Buffer,
     pub inputs: Vec<Buffer>,
@@ -28,7 +28,7 @@ const FACTOR: u32 = 5;
 
 impl Kernel {
     pub fn new(device: &Arc<Device>, count: u32) -> Self {
-        let pipeline = ComputePipeline::new(
+        let pipeline = Pipeline::compute(
             device,
             &PipelineDesc {
                 name: "resources",
@@ -82,7 +82,7 @@ impl Kernel {
 }
 
 /// A set for `resources.comp` over its five inputs and its output.
-pub fn bind(pipeline: &ComputePipeline, inputs: &[Buffer], sums: &Buffer) -> BindSet {
+pub fn bind(pipeline: &Pipeline, inputs: &[Buffer], sums: &Buffer) -> BindSet {
     let resources: Vec<_> = [0, 2, 4, 5, 8, 9]
         .into_iter()
         .zip(inputs.iter().chain([sums]))

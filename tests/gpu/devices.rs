@@ -20,9 +20,10 @@ fn devices_are_listed_and_selected() {
         assert!(!caps.name.is_empty());
         // A device that traces rays also computes, and a CPU never traces by circuits.
         assert!(caps.compute.is_ok() || caps.ray_query.is_err());
+        assert!(caps.compute.is_ok() || caps.ray_pipeline.is_err());
         assert!(!caps.ray_hardware_likely || caps.kind != DeviceKind::Cpu);
         assert!(!caps.ray_hardware_likely || caps.ray_query.is_ok());
-        for missing in [&caps.compute, &caps.ray_query]
+        for missing in [&caps.compute, &caps.ray_query, &caps.ray_pipeline]
             .into_iter()
             .filter_map(|r| r.as_ref().err())
         {

@@ -23,12 +23,25 @@ use etendue::gpu::{Device, DeviceRequest};
 /// Invocations a work group in the test kernels.
 const GROUP: usize = 64;
 
+/// How a device traces rays.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Rays {
+    None,
+    Query,
+    Pipeline,
+}
+
 /// A device under validation, or the printed reason why there is none.
 fn open(ray_query: bool) -> Option<Arc<Device>> {
+    open_for(if ray_query { Rays::Query } else { Rays::None })
+}
+
+fn open_for(rays: Rays) -> Option<Arc<Device>> {
     let request = DeviceRequest {
         select: None,
         validation: true,
-        ray_query,
+        ray_query: rays == Rays::Query,
+        ray_pipeline: rays == Rays::Pipeline,
     };
     match Device::open(&request) {
         Ok(device) => Some(device),

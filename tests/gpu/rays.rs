@@ -1,16 +1,26 @@
-//! Acceleration structures and `traverse_query.glsl`.
+//! Acceleration structures, `traverse_query.glsl` and `traverse_pipeline.glsl`.
 
 use std::sync::Arc;
 
+use etendue::Error;
 use etendue::gpu::{
-    BindSet, BindingKind, Blas, BlasGeometry, Buffer, ComputePipeline, Device, Memory,
-    PipelineDesc, Resource, Tlas, TlasInstance, Usage,
+    BindSet, BindingKind, Blas, BlasGeometry, Buffer, Device, Memory, Pipeline, PipelineDesc,
+    RayStages, Resource, Tlas, TlasInstance, Usage,
 };
 use etendue::layout::{BIND_PROBE_HITS, BIND_PROBE_RAYS, BIND_SCENE, NONE, ProbeHit, ProbeRay};
 
-use crate::{GROUP, finish, open};
+use crate::{GROUP, Rays, finish, missing_of, open, open_for};
 
-const RAYS: &[u8] = include_bytes!(concat!(env!("OUT_DIR"), "/test_rays.spv"));
+macro_rules! module {
+    ($name:literal) => {
+        bytemuck::pod_collect_to_vec::<u8, u32>(include_bytes!(concat!(
+            env!("OUT_DIR"),
+            "/",
+            $name,
+            ".spv"
+        )))
+    };
+}
 
 /// Constant of `spec.glsl` that switches candidates on.
 const HAS_ALPHA: u32 = 1;
@@ -42,23 +52,45 @@ fn group(device: &Arc<Device>, triangles: &[[u32; 3]], opaque: bool) -> Blas {
     blas
 }
 
-/// What the rays meet in the scene.
-fn trace(device: &Arc<Device>, scene: &Tlas, alpha: bool, rays: &[ProbeRay]) -> Vec<ProbeHit> {
-    let pipeline = ComputePipeline::new(
-        device,
-        &PipelineDesc {
-            name: "rays",
-            spirv: &bytemuck::pod_collect_to_vec::<u8, u32>(RAYS),
-            bindings: &[
-                (BIND_SCENE, BindingKind::AccelerationStructure),
-                (BIND_PROBE_RAYS, BindingKind::Storage),
-                (BIND_PROBE_HITS, BindingKind::Storage),
-            ],
-            constants: &[(HAS_ALPHA, alpha.into()), (HAS_NESTED, 0)],
-            push_bytes: 4,
+const BINDINGS: [(u32, BindingKind); 3] = [
+    (BIND_SCENE, BindingKind::AccelerationStructure),
+    (BIND_PROBE_RAYS, BindingKind::Storage),
+    (BIND_PROBE_HITS, BindingKind::Storage),
+];
+
+/// The test kernel for the rays of the device, or why there is none.
+fn kernel(device: &Arc<Device>, by: Rays, alpha: bool) -> Result<Pipeline, Error> {
+    let desc = PipelineDesc {
+        name: "rays",
+        spirv: &match by {
+            Rays::Pipeline => module!("test_rays_pipeline"),
+            _ => module!("test_rays"),
         },
-    )
-    .unwrap();
+        bindings: &BINDINGS,
+        constants: &[(HAS_ALPHA, alpha.into()), (HAS_NESTED, 0)],
+        push_bytes: 4,
+    };
+    if by != Rays::Pipeline {
+        return Pipeline::compute(device, &desc);
+    }
+    let any_hit = module!("test_rays_any_hit");
+    let stages = RayStages {
+        miss: &module!("trace_miss"),
+        closest_hit: &module!("trace_closest_hit"),
+        any_hit: alpha.then_some(&any_hit),
+    };
+    Pipeline::rays(device, &desc, &stages)
+}
+
+/// What the rays meet in the scene.
+fn trace(
+    device: &Arc<Device>,
+    by: Rays,
+    scene: &Tlas,
+    alpha: bool,
+    rays: &[ProbeRay],
+) -> Vec<ProbeHit> {
+    let pipeline = kernel(device, by, alpha).unwrap();
     let bytes = size_of_val(rays) as u64;
     let input = Buffer::from_slice(device, "rays", Usage::STORAGE, rays).unwrap();
     let output = Buffer::new(device, "hits", bytes, Usage::STORAGE, Memory::Readback).unwrap();
@@ -71,8 +103,9 @@ fn trace(device: &Arc<Device>, scene: &Tlas, alpha: bool, rays: &[ProbeRay]) -> 
     let push = (rays.len() as u32).to_ne_bytes();
     let groups = [rays.len().div_ceil(GROUP) as u32, 1, 1];
     device
-        .run("rays", |commands| {
-            commands.dispatch(&pipeline, &set, &push, groups);
+        .run("rays", |commands| match by {
+            Rays::Pipeline => commands.trace(&pipeline, &set, &push, rays.len() as u32),
+            _ => commands.dispatch(&pipeline, &set, &push, groups),
         })
         .unwrap();
     output.read(rays.len()).unwrap()
@@ -119,7 +152,13 @@ const TURNED: [[f32; 3]; 4] = [
 
 #[test]
 fn rays_meet_placed_triangles() {
-    let Some(device) = open(true) else { return };
+    for by in [Rays::Query, Rays::Pipeline] {
+        rays_meet_placed_triangles_by(by);
+    }
+}
+
+fn rays_meet_placed_triangles_by(by: Rays) {
+    let Some(device) = open_for(by) else { return };
     let blas = group(&device, &[[0, 1, 2], [3, 4, 5]], true);
     let place = |world_from_object| TlasInstance {
         blas: &blas,
@@ -149,7 +188,7 @@ fn rays_meet_placed_triangles() {
         ray([0.25, 0.5, 3.0], down, -1.0),
         ray([0.25, 0.5, 3.0], down, f32::NAN),
     ];
-    let hits = trace(&device, &scene, false, &rays);
+    let hits = trace(&device, by, &scene, false, &rays);
     assert_hit(&hits[0], 3.0, [0.25, 0.5], 0, 0);
     assert_hit(&hits[1], 2.0, [0.25, 0.5], 0, 1);
     assert_miss(&hits[2]);
@@ -166,7 +205,13 @@ fn rays_meet_placed_triangles() {
 
 #[test]
 fn cut_out_triangles_are_passed() {
-    let Some(device) = open(true) else { return };
+    for by in [Rays::Query, Rays::Pipeline] {
+        cut_out_triangles_by(by);
+    }
+}
+
+fn cut_out_triangles_by(by: Rays) {
+    let Some(device) = open_for(by) else { return };
     let down = [0.0, 0.0, -1.0];
     let rays = [ray([0.25, 0.5, 3.0], down, 10.0)];
     let up = [ray([0.25, 0.5, -3.0], [0.0, 0.0, 1.0], 10.0)];
@@ -181,14 +226,14 @@ fn cut_out_triangles_are_passed() {
     let masked = scene_of(&[[0, 1, 2], [3, 4, 5]], false);
     // Primitive 1 lies behind from above, and in front from below, where it is passed.
     assert_hit(
-        &trace(&device, &masked, true, &rays)[0],
+        &trace(&device, by, &masked, true, &rays)[0],
         3.0,
         [0.25, 0.5],
         0,
         0,
     );
     assert_hit(
-        &trace(&device, &masked, true, &up)[0],
+        &trace(&device, by, &masked, true, &up)[0],
         3.0,
         [0.25, 0.5],
         0,
@@ -196,7 +241,7 @@ fn cut_out_triangles_are_passed() {
     );
     // Without the feature the ray's flag makes everything opaque.
     assert_hit(
-        &trace(&device, &masked, false, &up)[0],
+        &trace(&device, by, &masked, false, &up)[0],
         2.0,
         [0.25, 0.5],
         0,
@@ -205,7 +250,7 @@ fn cut_out_triangles_are_passed() {
     // An opaque group is not asked.
     let opaque = scene_of(&[[0, 1, 2], [3, 4, 5]], true);
     assert_hit(
-        &trace(&device, &opaque, true, &up)[0],
+        &trace(&device, by, &opaque, true, &up)[0],
         2.0,
         [0.25, 0.5],
         0,
@@ -213,24 +258,59 @@ fn cut_out_triangles_are_passed() {
     );
     // Nothing is left where every candidate is cut out: primitive 0 is out of the ray's way.
     let passed = scene_of(&[[0, 0, 0], [3, 4, 5]], false);
-    assert_miss(&trace(&device, &passed, true, &rays)[0]);
+    assert_miss(&trace(&device, by, &passed, true, &rays)[0]);
     drop((masked, opaque, passed));
     finish(device);
 }
 
 #[test]
 fn empty_scenes_are_missed() {
-    let Some(device) = open(true) else { return };
+    for by in [Rays::Query, Rays::Pipeline] {
+        empty_scenes_by(by);
+    }
+}
+
+fn empty_scenes_by(by: Rays) {
+    let Some(device) = open_for(by) else { return };
     let rays = [ray([0.25, 0.5, 3.0], [0.0, 0.0, -1.0], 10.0)];
     let nothing = Tlas::build(&device, "nothing", &[]).unwrap();
-    assert_miss(&trace(&device, &nothing, false, &rays)[0]);
+    assert_miss(&trace(&device, by, &nothing, false, &rays)[0]);
     let blas = group(&device, &[], true);
     let instance = TlasInstance {
         blas: &blas,
         world_from_object: IDENTITY,
     };
     let hollow = Tlas::build(&device, "hollow", &[instance]).unwrap();
-    assert_miss(&trace(&device, &hollow, true, &rays)[0]);
+    assert_miss(&trace(&device, by, &hollow, true, &rays)[0]);
     drop((nothing, blas, hollow));
+    finish(device);
+}
+
+#[test]
+fn launches_keep_to_what_the_device_was_opened_for() {
+    let Some(device) = open(true) else { return };
+    let message = missing_of(kernel(&device, Rays::Pipeline, false).err().unwrap());
+    assert!(message.contains("opened without"), "{message}");
+    finish(device);
+
+    let Some(device) = open_for(Rays::Pipeline) else {
+        return;
+    };
+    let pipeline = kernel(&device, Rays::Pipeline, false).unwrap();
+    let scene = Tlas::build(&device, "nothing", &[]).unwrap();
+    let buffer = |name| Buffer::new(&device, name, 16, Usage::STORAGE, Memory::Readback).unwrap();
+    let (input, output) = (buffer("rays"), buffer("hits"));
+    let resources = [
+        (BIND_SCENE, Resource::Acceleration(&scene)),
+        (BIND_PROBE_RAYS, Resource::Buffer(&input)),
+        (BIND_PROBE_HITS, Resource::Buffer(&output)),
+    ];
+    let set = BindSet::new(&pipeline, "rays", &resources).unwrap();
+    let count = device.caps().max_launch.checked_add(1).unwrap();
+    let result = device.run("too much", |commands| {
+        commands.trace(&pipeline, &set, &[0; 4], count);
+    });
+    assert!(missing_of(result.err().unwrap()).contains("at most"));
+    drop((set, input, output, scene, pipeline));
     finish(device);
 }

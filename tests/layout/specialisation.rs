@@ -51,7 +51,7 @@ fn frozen(kernel: &str, spec: &Spec) -> Option<Module> {
     Some(Module::parse(&std::fs::read(output.path()).unwrap()))
 }
 
-const KERNELS: [&str; 2] = ["path_software", "path_query"];
+const KERNELS: [&str; 3] = ["path_software", "path_query", "path_pipeline"];
 
 /// Everything on, the features that only a scene settles included.
 fn everything() -> Spec {
@@ -81,7 +81,7 @@ fn bare_kernels_touch_only_what_every_scene_has() {
             layout::BIND_MATERIALS,
         ];
         expected.extend(match kernel {
-            "path_query" => vec![layout::BIND_SCENE],
+            "path_query" | "path_pipeline" => vec![layout::BIND_SCENE],
             _ => vec![layout::BIND_BVH_NODES, layout::BIND_BVH_TRIANGLES],
         });
         assert_eq!(bare.bindings_in_use(), expected, "{kernel}");
@@ -130,7 +130,7 @@ fn each_feature_removes_code_and_its_buffers() {
         ("equiangular", |s| s.equiangular = false, &[]),
         ("sensor", |s| s.sensor = false, &[]),
     ];
-    // One kernel is enough: what is switched is the same in both.
+    // One kernel is enough: what is switched is the same in all.
     let kernel = KERNELS[0];
     let Some(full) = frozen(kernel, &everything()) else {
         return;

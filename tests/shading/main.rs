@@ -35,8 +35,8 @@ use std::sync::Arc;
 
 use etendue::Error;
 use etendue::gpu::{
-    BindSet, BindingKind, Buffer, ComputePipeline, Device, DeviceRequest, Memory, PipelineDesc,
-    Resource, Usage,
+    BindSet, BindingKind, Buffer, Device, DeviceRequest, Memory, Pipeline, PipelineDesc, Resource,
+    Usage,
 };
 
 /// Invocations a work group in the test kernels.
@@ -54,6 +54,7 @@ fn open() -> Option<Arc<Device>> {
         select: None,
         validation: true,
         ray_query: false,
+        ray_pipeline: false,
     };
     let required = std::env::var_os("ETENDUE_REQUIRE_DEVICE").is_some_and(|value| value == "1");
     match Device::open(&request) {
@@ -90,7 +91,7 @@ fn finish(device: Arc<Device>) {
 /// A test kernel.
 struct Kernel {
     device: Arc<Device>,
-    pipeline: ComputePipeline,
+    pipeline: Pipeline,
 }
 
 impl Kernel {
@@ -110,7 +111,7 @@ impl Kernel {
         };
         Self {
             device: Arc::clone(device),
-            pipeline: ComputePipeline::new(device, &desc).unwrap(),
+            pipeline: Pipeline::compute(device, &desc).unwrap(),
         }
     }
 

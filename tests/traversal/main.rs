@@ -26,7 +26,11 @@ use etendue::render::{Control, DeviceOptions, Renderer, Tuning};
 use etendue::scene::Scene;
 use etendue::settings::{BackendChoice, Settings};
 
-const BACKENDS: [BackendChoice; 2] = [BackendChoice::Bvh, BackendChoice::RayQuery];
+const BACKENDS: [BackendChoice; 3] = [
+    BackendChoice::Bvh,
+    BackendChoice::RayQuery,
+    BackendChoice::RayPipeline,
+];
 
 /// How shared meshes are traced.
 #[derive(Clone, Copy, Debug, PartialEq)]
