@@ -5,7 +5,7 @@ use std::sync::Arc;
 use super::{Check, Random};
 use crate::error::Result;
 use crate::gpu::{
-    BindSet, BindingKind, Buffer, ComputePipeline, Device, Memory, PipelineDesc, Resource, Usage,
+    BindSet, BindingKind, Buffer, Device, Memory, Pipeline, PipelineDesc, Resource, Usage,
 };
 
 const KERNEL: &[u8] = include_bytes!(concat!(env!("OUT_DIR"), "/selftest.spv"));
@@ -149,7 +149,7 @@ pub(super) fn checks(device: &Arc<Device>) -> Result<Vec<Check>> {
 
 /// What the operation gives for each argument, as bits.
 fn evaluate(device: &Arc<Device>, operation: Operation, x: &[[f32; 4]]) -> Result<Vec<u32>> {
-    let pipeline = ComputePipeline::new(
+    let pipeline = Pipeline::compute(
         device,
         &PipelineDesc {
             name: "selftest",

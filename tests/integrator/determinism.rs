@@ -6,7 +6,7 @@ use etendue::scene::{LightKind, PunctualLight, Scene};
 use etendue::settings::{BackendChoice, Crop, Settings};
 use glam::{DVec3, Vec3};
 
-use crate::BOTH;
+use crate::ALL;
 use crate::common::*;
 
 const SIDE: u32 = 20;
@@ -61,7 +61,7 @@ fn film(settings: &Settings, tuning: Tuning) -> Option<Film> {
 
 #[test]
 fn same_seed_gives_the_same_bits_however_the_work_is_cut() {
-    for backend in BOTH {
+    for backend in ALL {
         let Some(first) = film(&plain(backend), Tuning::default()) else {
             continue;
         };
@@ -134,7 +134,7 @@ fn a_renderer_that_starts_again_is_as_good_as_a_new_one() {
 
 #[test]
 fn crop_is_a_part_of_the_frame() {
-    for backend in BOTH {
+    for backend in ALL {
         let Some(whole) = film(&plain(backend), Tuning::default()) else {
             continue;
         };
@@ -166,7 +166,7 @@ fn crop_is_a_part_of_the_frame() {
 
 #[test]
 fn merged_films_are_the_film_of_all_samples() {
-    for backend in BOTH {
+    for backend in ALL {
         let part = |samples| {
             let settings = Settings {
                 samples,

@@ -33,7 +33,13 @@ use etendue::settings::BackendChoice;
 /// Standard errors between an estimate and what it is allowed to be: two-sided 1e-6.
 const Z: f64 = 4.9;
 
-/// Both traversals.
+/// All traversals, where a few samples do.
+const ALL: [BackendChoice; 3] = [
+    BackendChoice::Bvh,
+    BackendChoice::RayQuery,
+    BackendChoice::RayPipeline,
+];
+/// The two that every test can afford.
 const BOTH: [BackendChoice; 2] = [BackendChoice::Bvh, BackendChoice::RayQuery];
 
 /// Mean over pixels and channels with its standard error. Pixels are

@@ -6,7 +6,7 @@ use etendue::settings::{BackendChoice, Settings, Strategy};
 use glam::{DAffine3, DMat3, DQuat, DVec3, Vec3};
 
 use crate::scenes::{cube, icosphere, lambert, look_at, scaled, scene, white_sky};
-use crate::{BACKENDS, Levels, finish, open, render};
+use crate::{INTERSECTIONS, Levels, finish, open, render};
 
 const ALBEDO: f32 = 0.5;
 /// Roundings of the film and the BSDF, relative; one re-hit among the samples of a pixel changes it by 1/512 at least.
@@ -105,7 +105,7 @@ fn furnace(scene: &mut Scene, backend: BackendChoice, levels: Levels, label: &st
 #[test]
 fn convex_solids_do_not_meet_themselves() {
     let shapes = [("sphere", icosphere(2)), ("cube", cube())];
-    for backend in BACKENDS {
+    for backend in INTERSECTIONS {
         let mut spawned = 0.0;
         for (name, shape) in &shapes {
             for (size, place) in STANDS {
@@ -131,7 +131,7 @@ fn convex_solids_do_not_meet_themselves() {
 fn lit_sides_are_not_in_their_own_shadow() {
     const ILLUMINANCE: f32 = 3.0;
     let lit = ALBEDO * std::f32::consts::FRAC_1_PI * ILLUMINANCE / 3f32.sqrt();
-    for backend in BACKENDS {
+    for backend in INTERSECTIONS {
         // Every other stand: the rays of the furnace went through all of them.
         for (size, place) in STANDS.into_iter().step_by(2) {
             let (mut scene, turn, levels) = solid(&cube(), size, place);

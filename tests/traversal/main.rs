@@ -1,5 +1,5 @@
 //! Traversal held against double precision: what rays meet, that closed meshes
-//! have no gaps, that surfaces do not meet themselves, and that both backends and
+//! have no gaps, that surfaces do not meet themselves, and that all backends and
 //! both depths of the hierarchy agree. Everything runs under validation.
 //!
 //! Without a device the tests print why they are skipped; with the environment
@@ -31,6 +31,9 @@ const BACKENDS: [BackendChoice; 3] = [
     BackendChoice::RayQuery,
     BackendChoice::RayPipeline,
 ];
+/// Each with an intersection test of its own: where rays are many, and the ray tracing
+/// pipeline would meet the triangles of ray query once more.
+const INTERSECTIONS: [BackendChoice; 2] = [BackendChoice::Bvh, BackendChoice::RayQuery];
 
 /// How shared meshes are traced.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -1,4 +1,4 @@
-//! Both backends see the same and make the same pictures of the scenes that come
+//! All backends see the same and make the same pictures of the scenes that come
 //! with the project.
 
 use std::path::{Path, PathBuf};
@@ -206,15 +206,18 @@ fn compare(path: &Path) -> Option<()> {
     let same = |a: &ProbeHit, b: &ProbeHit| {
         (a.instance, a.primitive, a.occluded) == (b.instance, b.primitive, b.occluded)
     };
-    let sides = [0, 1].map(|i| Side {
-        hits: &hits[i],
-        levels: Levels::Flat,
-    });
-    other_ids(&name, &scene, &rays, sides, same);
+    for (other, backend) in BACKENDS.iter().enumerate().skip(1) {
+        let label = format!("{name}, {}", backend.name());
+        let sides = [0, other].map(|i| Side {
+            hits: &hits[i],
+            levels: Levels::Flat,
+        });
+        other_ids(&label, &scene, &rays, sides, same);
+        let worst = assert_same_picture(&label, &films[0], &films[other], SIZE);
+        println!("{label}: tiles differ by {worst:.2} deviations at most");
+    }
     let met = hits[0].iter().filter(|hit| hit.occluded != 0).count();
     assert!(met > rays.len() / 20, "{name}: only {met} rays hit");
-    let worst = assert_same_picture(&name, &films[0], &films[1], SIZE);
-    println!("{name}: {met} hits, tiles differ by {worst:.2} deviations at most");
     Some(())
 }
 

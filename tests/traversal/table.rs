@@ -67,7 +67,7 @@ fn assert_answer(label: &str, case: &Case, hit: &ProbeHit) {
     }
 }
 
-/// Holds the cases against the scene, on both backends.
+/// Holds the cases against the scene, on all backends.
 fn run(name: &str, scene: &Scene, levels: Levels, cases: &[Case]) {
     let brute = Brute::new(scene, levels);
     let rays: Vec<_> = cases.iter().map(|c| c.ray).collect();

@@ -8,7 +8,7 @@ use glam::{DAffine3, DVec3, Vec3};
 
 use crate::brute::origin;
 use crate::scenes::{Random, cube, fan, icosphere, lambert, scaled, scene, single};
-use crate::{BACKENDS, Levels, finish, prober};
+use crate::{INTERSECTIONS, Levels, finish, prober};
 
 /// Rays into each mesh and place; there are twelve for each backend.
 const RAYS: usize = 90_000;
@@ -134,7 +134,7 @@ fn closed_meshes_have_no_gaps() {
         .iter()
         .map(|s| rays_at_edges(&s.scene.meshes[0], &s.place, s.size, &mut random))
         .collect();
-    for backend in BACKENDS {
+    for backend in INTERSECTIONS {
         let mut lost = 0;
         for (stand, rays) in stands.iter().zip(&rays) {
             let Some(count) = leaks(&stand.scene, rays, backend, stand.levels) else {
@@ -184,7 +184,7 @@ fn closed_cube_along_the_axes() {
         }
     }
     let scene = single(cube());
-    for backend in BACKENDS {
+    for backend in INTERSECTIONS {
         let Some(renderer) = prober(&scene, backend, Levels::Flat) else {
             return;
         };
