@@ -112,7 +112,7 @@ fn same_seed_gives_the_same_bits_however_the_work_is_cut() {
 
 #[test]
 fn a_renderer_that_starts_again_is_as_good_as_a_new_one() {
-    for backend in BOTH {
+    for backend in ALL {
         let settings = plain(backend);
         let Some(fresh) = film(&settings, Tuning::default()) else {
             continue;
