@@ -55,7 +55,8 @@ void main()
     FilmNode levels[FILM_LEVELS];
     uint rays = 0u;
     uint truncated = 0u;
-    float truncated_throughput = 0.0;
+    // rounded for each sample, so that the sum is the same however samples are split
+    uint truncated_throughput = 0u;
     uint non_finite = 0u;
     PathState path = kernel_start(0u, pixel);
     PathResult result = path_result();
@@ -71,7 +72,7 @@ void main()
         }
         rays += result.rays;
         truncated += result.truncated > 0.0 ? 1u : 0u;
-        truncated_throughput += result.truncated;
+        truncated_throughput += uint(result.truncated * 65536.0 + 0.5);
         bool is_dropped = !is_finite(result.radiance);
         non_finite += is_dropped ? 1u : 0u;
 
@@ -100,7 +101,7 @@ void main()
 
     if (truncated != 0u) {
         atomicAdd(ledger[LEDGER_TRUNCATED], truncated);
-        ledger_add(LEDGER_THROUGHPUT_LOW, uint(truncated_throughput * 65536.0 + 0.5));
+        ledger_add(LEDGER_THROUGHPUT_LOW, truncated_throughput);
     }
     if (non_finite != 0u) {
         atomicAdd(ledger[LEDGER_NON_FINITE], non_finite);

@@ -35,6 +35,16 @@ pub enum Error {
         /// What is wrong and what would be right.
         what: String,
     },
+    /// A file of another render than the one at hand.
+    #[error("{}: {field} does not fit: {what}", path.display())]
+    Mismatch {
+        /// The file.
+        path: PathBuf,
+        /// What differs, by its name in headers.
+        field: &'static str,
+        /// What it is there and here.
+        what: String,
+    },
     /// No device, or none that can run what was asked for.
     #[error("{what}: {missing}")]
     Unsupported {

@@ -17,7 +17,7 @@ use std::ops::Range;
 
 use crate::error::{Error, Result};
 use crate::layout::{FILM_FLOATS, FILM_FLOATS_AOV};
-use crate::settings::Crop;
+use crate::settings::{Crop, Settings};
 
 /// One past the largest sample index, so that ends and node sizes fit 64 bits.
 pub const MAX_SAMPLES: u64 = 1 << 63;
@@ -67,6 +67,12 @@ impl Film {
             aovs,
             nodes: BTreeMap::new(),
         }
+    }
+
+    /// An empty film for what some settings render.
+    pub fn of(settings: &Settings) -> Self {
+        let full = (settings.width, settings.height);
+        Self::new(settings.window(), full, settings.aovs)
     }
 
     /// The pixels that the film holds.
@@ -123,6 +129,25 @@ impl Film {
             }
         }
         ranges
+    }
+
+    /// What the film lacks of some ranges, which are disjoint and in order.
+    pub fn missing(&self, samples: &[Range<u64>]) -> Vec<Range<u64>> {
+        let held = self.ranges();
+        let mut missing = Vec::new();
+        for range in samples {
+            let mut next = range.start;
+            for there in &held {
+                if there.start.min(range.end) > next {
+                    missing.push(next..there.start.min(range.end));
+                }
+                next = next.max(there.end);
+            }
+            if next < range.end {
+                missing.push(next..range.end);
+            }
+        }
+        missing
     }
 
     /// The nodes (first sample, level, values) in sample order: everything that

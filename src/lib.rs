@@ -3,6 +3,7 @@
 
 pub mod bvh;
 pub mod chart;
+pub mod checkpoint;
 pub mod compare;
 pub mod error;
 pub mod film;
@@ -17,3 +18,6 @@ pub mod settings;
 pub mod spec;
 
 pub use error::{Error, Result};
+
+/// Which sources this is built of: files of other builds may differ in some bits.
+pub const BUILD: &str = env!("ETENDUE_BUILD");

@@ -22,6 +22,7 @@ const MAY_USE: &[(&str, &[&str])] = &[
     ("film", &["error", "layout", "settings"]),
     ("image_io", &["error", "film", "settings"]),
     ("compare", &["error", "image_io"]),
+    ("checkpoint", &["error", "film", "image_io", "settings"]),
     ("spec", &["mutant", "scene", "settings"]),
     (
         "selftest",

@@ -142,6 +142,21 @@ fn gaps_stay_visible_and_count_only_what_is_there() {
     assert_eq!(film.nodes().count(), 10);
 }
 
+#[test]
+fn what_is_missing_is_told() {
+    let mut film = sequential(3..7, false);
+    film.merge(sequential(9..12, false)).unwrap();
+    for (asked, expected) in [
+        (vec![0..16], vec![0..3, 7..9, 12..16]),
+        (vec![3..7], vec![]),
+        (vec![4..10], vec![7..9]),
+        (vec![0..2, 5..6, 10..20], vec![0..2, 12..20]),
+        (vec![20..22], vec![20..22]),
+    ] {
+        assert_eq!(film.missing(&asked), expected, "of {asked:?}");
+    }
+}
+
 /// Each level of the tree doubles a constant, which is exact; so is the rest.
 #[test]
 fn a_million_equal_samples_lose_nothing() {

@@ -27,6 +27,10 @@ pub struct Arguments {
 pub enum Command {
     /// Render a scene
     Render(Box<RenderArgs>),
+    /// Merge shards of one render
+    Merge(MergeArgs),
+    /// Render an image again from its header
+    Rerender(RerenderArgs),
     /// Measure light in a scene: irradiance, radiance, intensity or flux
     Measure(Box<MeasureArgs>),
     /// Compare two images: whether they differ by more than their noise, and how much
@@ -49,6 +53,43 @@ pub struct InfoArgs {
     /// Print one JSON object
     #[arg(long)]
     pub json: bool,
+}
+
+/// `etendue merge`
+#[derive(Args)]
+pub struct MergeArgs {
+    /// Images of `etendue render --samples A..B`, or merged ones
+    #[arg(required = true, value_name = "SHARD.exr")]
+    pub shards: Vec<PathBuf>,
+    /// Image to write
+    #[arg(short, long, value_name = "FILE.exr")]
+    pub output: PathBuf,
+    /// Allow samples to be missing; the header then tells which are there
+    #[arg(long)]
+    pub partial: bool,
+}
+
+/// `etendue rerender`
+#[derive(Args)]
+pub struct RerenderArgs {
+    /// Image of `etendue render` or `merge`
+    #[arg(value_name = "FILE.exr")]
+    pub image: PathBuf,
+    /// Image to write, .exr or .png by its suffix; may be given several times
+    #[arg(short, long, value_name = "FILE", required = true)]
+    pub output: Vec<PathBuf>,
+    /// Where the scene is now [default: where the header says]
+    #[arg(long, value_name = "FILE")]
+    pub scene: Option<PathBuf>,
+    /// Where the environment image is now [default: where the header says]
+    #[arg(long, value_name = "FILE")]
+    pub env: Option<PathBuf>,
+    /// Vulkan device, by index or a part of its name [default: as the header says]
+    #[arg(long, value_name = "INDEX|NAME")]
+    pub device: Option<String>,
+    /// Show errors only
+    #[arg(short, long)]
+    pub quiet: bool,
 }
 
 /// `etendue measure`
@@ -207,6 +248,17 @@ pub struct RenderArgs {
           value_parser = finite)]
     pub exposure: f64,
 
+    /// Save all work in this file at an interval, at the end and when interrupted
+    #[arg(long, value_name = "FILE")]
+    pub checkpoint: Option<PathBuf>,
+    /// Seconds between checkpoints, at least
+    #[arg(long, value_name = "SECONDS", requires = "checkpoint", default_value_t = 60.0,
+          allow_negative_numbers = true, value_parser = not_negative)]
+    pub checkpoint_interval: f64,
+    /// Go on from the checkpoint, if it is there
+    #[arg(long, requires = "checkpoint")]
+    pub resume: bool,
+
     /// Write statistics as JSON
     #[arg(long, value_name = "FILE.json")]
     pub stats: Option<PathBuf>,
@@ -322,7 +374,8 @@ fn finite(text: &str) -> Result<f64, String> {
     }
 }
 
-fn samples(text: &str) -> Result<Range<u64>, String> {
+/// `A..B`, not empty.
+pub fn samples(text: &str) -> Result<Range<u64>, String> {
     let range = text
         .split_once("..")
         .and_then(|(a, b)| Some(a.parse().ok()?..b.parse().ok()?));

@@ -102,7 +102,7 @@ impl Failure {
 impl From<Error> for Failure {
     fn from(error: Error) -> Self {
         let code = match error {
-            Error::Settings { .. } => USAGE,
+            Error::Settings { .. } | Error::Mismatch { .. } => USAGE,
             Error::Scene { .. } => BAD_SCENE,
             Error::Unsupported { .. } => NO_DEVICE,
             _ => FAILED,

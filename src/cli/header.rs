@@ -1,6 +1,7 @@
 //! What is known about a render, under the names of the EXR header. `stats.rs`
 //! nests the same names (`times.load` …), so both files agree.
 
+use std::ops::Range;
 use std::path::Path;
 
 use etendue::film::Film;
@@ -10,6 +11,10 @@ use etendue::scene::Scene;
 use etendue::settings::Settings;
 
 use super::args::{Backend, RenderArgs};
+use super::rerender::Repeat;
+
+/// The name of the limit that ended a render.
+pub const STOP: &str = "ledger.stop";
 
 /// Which limit ended a render.
 #[derive(Clone, Copy, PartialEq)]
@@ -24,34 +29,39 @@ pub enum Stop {
     Interrupt,
 }
 
-/// Everything about a render that has ended.
-pub struct Record<'a> {
+/// What is to be rendered.
+pub struct Job<'a> {
     /// What was typed.
     pub args: &'a RenderArgs,
-    /// What it meant.
-    pub settings: &'a Settings,
-    /// What was rendered.
-    pub scene: &'a Scene,
+    /// What it means.
+    pub settings: Settings,
+    /// The scene with the environment of the arguments.
+    pub scene: Scene,
     /// SHA-256 of the file of `--env`.
     pub env_hash: Option<String>,
+    /// Seconds it took to load the scene.
+    pub load: f64,
+    /// The render that this one repeats.
+    pub repeats: Option<&'a Repeat>,
+}
+
+/// Everything about a render that has ended.
+pub struct Record<'a> {
+    /// What was rendered.
+    pub job: &'a Job<'a>,
     /// What the renderer says.
     pub report: &'a Report,
     /// The result.
     pub film: &'a Film,
     /// Why it ended.
     pub stop: Stop,
-    /// Seconds it took to load the scene.
-    pub load: f64,
 }
 
 impl Record<'_> {
     /// The header: all that is needed to render the file again and to judge it.
     pub fn metadata(&self) -> Metadata {
-        let mut data = Metadata::new();
+        let mut data = self.job.metadata();
         let mut put = |name: &str, value: Value| data.insert(name.to_owned(), value);
-        put("version", env!("CARGO_PKG_VERSION").into());
-        put("scene", path(&self.args.scene));
-        put("scene_hash", self.scene.hash.as_str().into());
         put("backend", self.report.backend.name().into());
         put("backend_reason", self.report.backend_reason.as_str().into());
         put("device", self.report.device.as_str().into());
@@ -59,11 +69,9 @@ impl Record<'_> {
         let features = self.report.features.iter().filter(|f| f.on);
         let features: Vec<_> = features.map(|f| f.name).collect();
         put("features", features.join(" ").into());
-        let ranges = self.film.ranges().into_iter();
-        let ranges: Vec<_> = ranges.map(|r| format!("{}..{}", r.start, r.end)).collect();
-        put("samples", ranges.join(",").into());
+        put("samples", ranges(&self.film.ranges()).into());
         put("spp", count(self.film.samples()));
-        put("times.load", self.load.into());
+        put("times.load", self.job.load.into());
         put("times.build", self.report.times.build.into());
         put("times.compile", self.report.times.compile.into());
         put("times.render", self.report.times.render.into());
@@ -78,14 +86,48 @@ impl Record<'_> {
             count(ledger.interior_overflows),
         );
         // a limit that looks at the samples favours images that look finished early
-        put("ledger.stop", self.stop_text().into());
+        put(STOP, self.stop_text().into());
+        data
+    }
+
+    /// The reason for the end, as in the header.
+    pub fn stop_text(&self) -> String {
+        let repeated = self.job.repeats.and_then(|repeat| repeat.header.get(STOP));
+        match (self.stop, repeated) {
+            // the same samples, chosen by the same limit
+            (Stop::Samples, Some(Value::Text(stop))) => stop.clone(),
+            (Stop::Samples, _) => String::from("samples"),
+            (Stop::Time(limit), _) => format!("time {limit}"),
+            (Stop::Noise(limit), _) => format!("noise {limit}"),
+            (Stop::Interrupt, _) => String::from("interrupt"),
+        }
+    }
+}
+
+impl Job<'_> {
+    /// The samples to render.
+    pub fn samples(&self) -> Vec<Range<u64>> {
+        match self.repeats {
+            Some(repeat) => repeat.samples.clone(),
+            None => vec![self.settings.samples.clone()],
+        }
+    }
+
+    /// What can be said before anything is rendered.
+    pub fn metadata(&self) -> Metadata {
+        let mut data = Metadata::new();
+        let mut put = |name: &str, value: Value| data.insert(name.to_owned(), value);
+        put("version", env!("CARGO_PKG_VERSION").into());
+        put("build", etendue::BUILD.into());
+        put("scene", path(&self.args.scene));
+        put("scene_hash", self.scene.hash.as_str().into());
         self.put_settings(&mut data);
         data
     }
 
     /// Every setting under its option's name.
     fn put_settings(&self, data: &mut Metadata) {
-        let (args, settings) = (self.args, self.settings);
+        let (args, settings) = (self.args, &self.settings);
         let mut put = |name: &str, value: Value| data.insert(format!("settings.{name}"), value);
         put("width", f64::from(settings.width).into());
         put("height", f64::from(settings.height).into());
@@ -134,16 +176,15 @@ impl Record<'_> {
         let aovs: Vec<_> = args.aovs().into_iter().map(|aov| aov.name()).collect();
         put("aov", aovs.join(",").into());
     }
+}
 
-    /// The reason for the end, as in the header.
-    pub fn stop_text(&self) -> String {
-        match self.stop {
-            Stop::Samples => String::from("samples"),
-            Stop::Time(limit) => format!("time {limit}"),
-            Stop::Noise(limit) => format!("noise {limit}"),
-            Stop::Interrupt => String::from("interrupt"),
-        }
-    }
+/// `A..B,C..D`
+pub fn ranges(ranges: &[Range<u64>]) -> String {
+    let texts: Vec<_> = ranges
+        .iter()
+        .map(|r| format!("{}..{}", r.start, r.end))
+        .collect();
+    texts.join(",")
 }
 
 fn path(path: &Path) -> Value {

@@ -4,15 +4,20 @@
 mod args;
 mod bench;
 mod chart;
+mod checkpoint;
 mod compare;
 mod failure;
 mod header;
+mod identity;
 mod info;
 mod interrupt;
 mod measure;
+mod merge;
 mod progress;
 mod render;
+mod rerender;
 mod selftest;
+mod settings;
 mod stats;
 
 use std::io::{self, IsTerminal, Write};
@@ -33,6 +38,14 @@ pub fn main() -> ExitCode {
             let quiet = args.quiet || args.progress == ProgressName::Json;
             log_to_stderr(quiet, args.verbose);
             render::run(&args)
+        }
+        Command::Merge(args) => {
+            log_to_stderr(false, 0);
+            merge::run(&args)
+        }
+        Command::Rerender(args) => {
+            log_to_stderr(args.quiet, 0);
+            rerender::run(&args)
         }
         Command::Measure(args) => {
             log_to_stderr(args.quiet, 0);

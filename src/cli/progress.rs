@@ -148,7 +148,10 @@ impl Status {
     fn of(progress: &Progress, time_limit: Option<f64>) -> Self {
         let elapsed = progress.elapsed.as_secs_f64();
         let fraction = progress.fraction;
-        let by_samples = (fraction > 0.0).then(|| elapsed * (1.0 - fraction) / fraction);
+        // of this run alone: what was there before took other time
+        let total = progress.samples_total.max(1) as f64;
+        let run = fraction - progress.samples_before as f64 / total;
+        let by_samples = (run > 0.0).then(|| elapsed * (1.0 - fraction) / run);
         let by_time = time_limit.map(|limit| (limit - elapsed).max(0.0));
         let left = match (by_samples, by_time) {
             (Some(a), Some(b)) => Some(a.min(b)),
@@ -160,7 +163,7 @@ impl Status {
             fraction,
             elapsed,
             rate: if elapsed > 0.0 {
-                fraction * progress.samples_total as f64 / elapsed
+                run * total / elapsed
             } else {
                 0.0
             },
@@ -217,6 +220,8 @@ fn duration(seconds: f64) -> String {
 
 #[cfg(test)]
 mod tests {
+    use etendue::render::Work;
+
     use super::*;
 
     #[test]
@@ -244,6 +249,8 @@ mod tests {
         let film = etendue::film::Film::new(window, (1, 1), false);
         let progress = |fraction| Progress {
             film: &film,
+            work: Work::default(),
+            samples_before: 0,
             samples_done: 16,
             samples_total: 100,
             fraction,
@@ -256,5 +263,12 @@ mod tests {
         assert_eq!(left(0.25, Some(5.0)), Some(0.0));
         assert_eq!(left(0.0, None), None);
         assert_eq!(Status::of(&progress(0.25), None).rate, 2.5);
+        let resumed = Progress {
+            samples_before: 20,
+            ..progress(0.25)
+        };
+        let status = Status::of(&resumed, None);
+        assert!((status.rate - 0.5).abs() < 1e-12, "{}", status.rate);
+        assert_eq!(status.left.map(f64::round), Some(150.0));
     }
 }

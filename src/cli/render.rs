@@ -4,73 +4,135 @@ use std::path::Path;
 use std::time::Instant;
 
 use etendue::film::Film;
-use etendue::image_io::{Aov, Format, Image, probe_writable, write_bytes, write_exr, write_png};
-use etendue::render::{Control, DeviceOptions, Progress, Renderer};
-use etendue::scene::{Camera, Environment, Projection, Scene, gltf, load_environment};
-use etendue::settings::Settings;
+use etendue::image_io::{Format, Image, probe_writable, write_bytes, write_exr, write_png};
+use etendue::render::{Control, DeviceOptions, Progress, Renderer, Report, Work};
+use etendue::scene::{Environment, Scene, gltf, load_environment};
 use etendue::{Error, Result};
 
 use super::args::RenderArgs;
+use super::checkpoint::{self, Keeper, Saved};
 use super::failure::{Failure, Outcome};
-use super::header::{Record, Stop};
+use super::header::{self, Job, Record, Stop};
 use super::interrupt::Interrupt;
 use super::progress::Reporter;
+use super::rerender::Repeat;
+use super::settings::{DEFAULT_SPP, settings};
 use super::{stats, write_stderr};
 
-/// Width of the frame when none is asked for, pixels.
-const DEFAULT_WIDTH: u32 = 1280;
-/// Samples per pixel when none are asked for.
-const DEFAULT_SPP: u64 = 128;
-/// Aspect of the frame when neither arguments nor camera tell.
-const DEFAULT_ASPECT: f64 = 16.0 / 9.0;
 /// With fewer samples the standard error itself is too uncertain to decide by.
 const MIN_SAMPLES_FOR_NOISE: u64 = 16;
 
 /// Renders and writes what was asked for.
 pub fn run(args: &RenderArgs) -> Result<Outcome, Failure> {
+    repeat(args, None)
+}
+
+/// As [`run`]; with a header, the samples of that one, and only if everything is as it says.
+pub fn repeat(args: &RenderArgs, repeats: Option<&Repeat>) -> Result<Outcome, Failure> {
     let start = Instant::now();
     check_outputs(args)?;
+    let saved = checkpoint::open(args)?;
     let interrupt = Interrupt::install()?;
     let mut reporter = Reporter::new(args);
-    let (scene, env_hash) = load(args)?;
-    let load = start.elapsed().as_secs_f64();
-    tracing::info!("loaded {} in {load:.3} s", args.scene.display());
-    for warning in &scene.warnings {
+    let job = prepare(args, repeats, start)?;
+    for warning in &job.scene.warnings {
         reporter.warn(warning);
     }
-    let settings = settings(args, &scene)?;
+    if let Some(saved) = &saved {
+        saved.check_job(&job)?;
+    }
     let device = DeviceOptions {
         device: args.device.clone(),
         validation: false,
     };
-    let mut renderer = Renderer::new(&scene, &settings, &device)?;
-    introduce(&reporter, args, &scene, &settings, &renderer);
+    let mut renderer = Renderer::new(&job.scene, &job.settings, &device)?;
+    introduce(&reporter, &job, &renderer);
+    let (film, work) = begin(&job, saved, &renderer.report(), &reporter)?;
 
     interrupt.begin_rendering();
-    let (film, stop) = render(&mut renderer, args, &settings, &interrupt, &mut reporter)?;
+    let (film, stop) = render(&mut renderer, &job, film, work, &interrupt, &mut reporter)?;
     interrupt.begin_writing();
     reporter.clear();
-    if film.samples() == 0 {
-        write_stderr("error: interrupted before the first pass was complete; nothing is written");
-        return Ok(Outcome::Interrupted);
-    }
     let report = renderer.report();
     let record = Record {
-        args,
-        settings: &settings,
-        scene: &scene,
-        env_hash,
+        job: &job,
         report: &report,
         film: &film,
         stop,
-        load,
     };
+    // first, so that nothing is lost where the images cannot be written
+    let saved = match &args.checkpoint {
+        Some(path) => checkpoint::save(path, &record).map_err(Failure::from),
+        None => Ok(()),
+    };
+    if film.samples() == 0 {
+        saved?;
+        write_stderr("error: interrupted before the first pass was complete; nothing is written");
+        return Ok(Outcome::Interrupted);
+    }
     warn_about(&record, &reporter);
-    finish(&record, &reporter, start)?;
+    let finished = finish(&record, &reporter, start);
+    saved.and(finished)?;
     Ok(match stop {
         Stop::Interrupt => Outcome::Interrupted,
         _ => Outcome::Done,
     })
+}
+
+/// Loads the scene and decides what is rendered.
+fn prepare<'a>(
+    args: &'a RenderArgs,
+    repeats: Option<&'a Repeat>,
+    start: Instant,
+) -> Result<Job<'a>, Failure> {
+    let (scene, env_hash) = load(args)?;
+    let load = start.elapsed().as_secs_f64();
+    tracing::info!("loaded {} in {load:.3} s", args.scene.display());
+    let job = Job {
+        args,
+        settings: settings(args, &scene)?,
+        scene,
+        env_hash,
+        load,
+        repeats,
+    };
+    if let Some(repeat) = repeats {
+        repeat.check_job(&job)?;
+    }
+    Ok(job)
+}
+
+/// The film to begin with, and what it took.
+fn begin(
+    job: &Job,
+    saved: Option<Saved>,
+    report: &Report,
+    reporter: &Reporter,
+) -> Result<(Film, Work)> {
+    let empty = Film::of(&job.settings);
+    let record = Record {
+        job,
+        report,
+        film: &empty,
+        stop: Stop::Samples,
+    };
+    if let Some(repeat) = job.repeats {
+        repeat.warn_about(&record, reporter);
+    }
+    if let Some(saved) = saved {
+        saved.check_device(&record)?;
+        let work = saved.work();
+        let held = header::ranges(&saved.film.ranges());
+        reporter.note(&format!("going on from samples {held}"));
+        return Ok((saved.film, work));
+    }
+    if let Some(path) = job.args.checkpoint.as_ref().filter(|_| job.args.resume) {
+        let path = path.display();
+        reporter.note(&format!(
+            "there is no {path} yet: starting at the first sample"
+        ));
+    }
+    Ok((empty, Work::default()))
 }
 
 /// Finds out before the work whether its result can be written.
@@ -127,93 +189,9 @@ pub fn load_scene(
     Ok((scene, Some(loaded.hash)))
 }
 
-/// What the arguments mean for this scene.
-fn settings(args: &RenderArgs, scene: &Scene) -> Result<Settings> {
-    let camera = match &args.camera {
-        Some(name) => Some(find_camera(scene, name)?),
-        None => None,
-    };
-    let (width, height) = frame(scene, camera, args.width, args.height, DEFAULT_WIDTH);
-    let samples = args.samples.clone();
-    let settings = Settings {
-        width,
-        height,
-        crop: args.crop,
-        samples: samples.unwrap_or_else(|| 0..args.spp.unwrap_or(DEFAULT_SPP)),
-        seed: args.seed,
-        max_depth: args.max_depth,
-        backend: args.backend.into(),
-        estimator: args.estimator.into(),
-        camera,
-        aovs: args.aovs().into_iter().any(Aov::needs_first_hit),
-        ..Settings::default()
-    };
-    settings.validate()?;
-    Ok(settings)
-}
-
-/// Width and height of the frame: as asked, else by the camera's aspect, else so wide.
-pub fn frame(
-    scene: &Scene,
-    camera: Option<usize>,
-    width: Option<u32>,
-    height: Option<u32>,
-    default_width: u32,
-) -> (u32, u32) {
-    let aspect = scene
-        .cameras
-        .get(camera.unwrap_or(0))
-        .and_then(aspect)
-        .unwrap_or(DEFAULT_ASPECT);
-    match (width, height) {
-        (Some(width), Some(height)) => (width, height),
-        (None, Some(height)) => (pixels(f64::from(height) * aspect), height),
-        (width, None) => {
-            let width = width.unwrap_or(default_width);
-            (width, pixels(f64::from(width) / aspect))
-        }
-    }
-}
-
-/// Whole pixels, at least one.
-fn pixels(length: f64) -> u32 {
-    // `as` saturates; `validate` refuses what is too large
-    length.round().max(1.0) as u32
-}
-
-/// Width over height that a camera asks for.
-fn aspect(camera: &Camera) -> Option<f64> {
-    match camera.projection {
-        Projection::Perspective { aspect, .. } => aspect.map(f64::from),
-        Projection::Orthographic { xmag, ymag } => Some(f64::from(xmag) / f64::from(ymag)),
-    }
-    .filter(|aspect| aspect.is_finite() && *aspect > 0.0)
-}
-
-/// A camera by its name or, where none is called so, by its index.
-fn find_camera(scene: &Scene, asked: &str) -> Result<usize> {
-    let by_name = scene.cameras.iter().position(|c| c.name == asked);
-    let by_index = || asked.parse().ok().filter(|&i| i < scene.cameras.len());
-    by_name.or_else(by_index).ok_or_else(|| {
-        let names: Vec<_> = scene.cameras.iter().map(|c| c.name.as_str()).collect();
-        Error::Settings {
-            name: "--camera",
-            what: match names.is_empty() {
-                true => format!("there is no {asked}: the scene has no cameras"),
-                false => format!("there is no {asked}; the scene has {}", names.join(", ")),
-            },
-        }
-    })
-}
-
 /// Says what is going to be rendered, how, and with which parts of the model.
-fn introduce(
-    reporter: &Reporter,
-    args: &RenderArgs,
-    scene: &Scene,
-    settings: &Settings,
-    renderer: &Renderer,
-) {
+fn introduce(reporter: &Reporter, job: &Job, renderer: &Renderer) {
+    let settings = &job.settings;
     let report = renderer.report();
     let names = |on: bool| {
         let chosen = report.features.iter().filter(|f| f.on == on);
@@ -227,8 +205,8 @@ fn introduce(
     let window = settings.window();
     reporter.note(&format!(
         "{}: {} triangles, {} × {} pixels, samples {}..{}",
-        args.scene.display(),
-        scene.triangle_count(),
+        job.args.scene.display(),
+        job.scene.triangle_count(),
         window.x1 - window.x0,
         window.y1 - window.y0,
         settings.samples.start,
@@ -250,26 +228,33 @@ fn introduce(
 /// Renders until the first limit is reached.
 fn render(
     renderer: &mut Renderer,
-    args: &RenderArgs,
-    settings: &Settings,
+    job: &Job,
+    film: Film,
+    before: Work,
     interrupt: &Interrupt,
     reporter: &mut Reporter,
 ) -> Result<(Film, Stop)> {
+    let samples = job.samples();
     let mut stop = Stop::Samples;
-    let film = renderer.render(&mut |progress| {
+    let mut keeper = Keeper::new(job, &renderer.report());
+    let film = renderer.resume(film, before, &samples, &mut |progress| {
         reporter.update(progress);
         stop = if interrupt.is_requested() {
             Stop::Interrupt
         } else {
-            limit(args, progress)
+            limit(job.args, progress)
         };
-        match stop {
-            Stop::Samples => Control::Continue,
-            _ => Control::Stop,
+        if stop != Stop::Samples {
+            return Control::Stop;
         }
+        if let Some(Err(error)) = keeper.as_mut().map(|keeper| keeper.update(progress)) {
+            // the next one may succeed
+            reporter.warn(&error.to_string());
+        }
+        Control::Continue
     })?;
     // the limit came with the last sample: nothing was cut short
-    if film.samples() == settings.samples.end - settings.samples.start {
+    if film.missing(&samples).is_empty() {
         stop = Stop::Samples;
     }
     Ok((film, stop))
@@ -313,7 +298,7 @@ fn warn_about(record: &Record, reporter: &Reporter) {
             ledger.interior_overflows
         ));
     }
-    let args = record.args;
+    let args = record.job.args;
     let by_default = args.spp.is_none() && args.samples.is_none();
     if record.stop == Stop::Samples && by_default && (args.time.is_some() || args.noise.is_some()) {
         reporter.warn(&format!(
@@ -325,15 +310,19 @@ fn warn_about(record: &Record, reporter: &Reporter) {
 /// Writes every file, the remaining ones also when one fails.
 fn finish(record: &Record, reporter: &Reporter, start: Instant) -> Result<(), Failure> {
     let writing = Instant::now();
-    let image = Image::from_film(record.film, &record.args.aovs(), record.metadata())?;
+    let args = record.job.args;
+    let mut image = Image::from_film(record.film, &args.aovs(), record.metadata())?;
+    if args.samples.is_some() {
+        image.push_nodes(record.film);
+    }
     let mut result = Ok(());
     let mut written = Vec::new();
-    for path in &record.args.output {
+    for path in &args.output {
         let wrote = if is_exr(path) {
             write_exr(path, &image)
         } else {
-            let exposure = record.args.exposure as f32;
-            write_png(path, &image, record.args.tone(), exposure)
+            let exposure = args.exposure as f32;
+            write_png(path, &image, args.tone(), exposure)
         };
         match wrote {
             Ok(()) => written.push(path.clone()),
@@ -347,7 +336,7 @@ fn finish(record: &Record, reporter: &Reporter, start: Instant) -> Result<(), Fa
     for path in &written {
         tracing::info!("wrote {}", path.display());
     }
-    if let Some(path) = &record.args.stats {
+    if let Some(path) = &args.stats {
         let text = format!("{:#}\n", stats::statistics(record, &late));
         if let Err(error) = write_bytes(path, text.as_bytes()) {
             result = result.and(Err(Failure::from(error)));
@@ -358,89 +347,4 @@ fn finish(record: &Record, reporter: &Reporter, start: Instant) -> Result<(), Fa
         reporter.finish(record.film.samples(), &stop, late.total, &written);
     }
     result
-}
-
-#[cfg(test)]
-mod tests {
-    use clap::Parser;
-    use glam::DAffine3;
-
-    use super::super::args::{Arguments, Command};
-    use super::*;
-
-    fn parse(line: &str) -> RenderArgs {
-        let words = "etendue render scene.gltf -o out.exr".split(' ');
-        match Arguments::parse_from(words.chain(line.split_whitespace())).command {
-            Command::Render(args) => *args,
-            _ => unreachable!("the line says render"),
-        }
-    }
-
-    fn scene() -> Scene {
-        let camera = |name: &str, projection| Camera {
-            name: name.to_owned(),
-            world_from_camera: DAffine3::IDENTITY,
-            projection,
-        };
-        let wide = Projection::Perspective {
-            yfov: 1.0,
-            aspect: Some(2.0),
-        };
-        let open = Projection::Perspective {
-            yfov: 1.0,
-            aspect: None,
-        };
-        let flat = Projection::Orthographic {
-            xmag: 1.0,
-            ymag: 4.0,
-        };
-        Scene {
-            cameras: vec![
-                camera("1", wide),
-                camera("open", open),
-                camera("flat", flat),
-            ],
-            ..Scene::default()
-        }
-    }
-
-    #[test]
-    fn the_frame_follows_the_camera() {
-        let size = |line: &str, scene: &Scene| {
-            let settings = settings(&parse(line), scene).unwrap();
-            (settings.width, settings.height)
-        };
-        assert_eq!(size("", &scene()), (1280, 640));
-        assert_eq!(size("--width 100", &scene()), (100, 50));
-        assert_eq!(size("--height 100", &scene()), (200, 100));
-        assert_eq!(size("--width 100 --height 3", &scene()), (100, 3));
-        assert_eq!(size("--camera open", &scene()), (1280, 720));
-        assert_eq!(size("--camera flat --width 100", &scene()), (100, 400));
-        assert_eq!(size("", &Scene::default()), (1280, 720));
-    }
-
-    #[test]
-    fn cameras_go_by_name_before_index() {
-        let index = |name: &str| settings(&parse(&format!("--camera {name}")), &scene());
-        // a camera is called 1, and it is the first one
-        assert_eq!(index("1").unwrap().camera, Some(0));
-        assert_eq!(index("2").unwrap().camera, Some(2));
-        let message = index("3").unwrap_err().to_string();
-        assert!(message.contains("1, open, flat"), "{message}");
-    }
-
-    #[test]
-    fn samples_come_from_either_option() {
-        let samples = |line: &str| settings(&parse(line), &scene()).unwrap().samples;
-        assert_eq!(samples(""), 0..128);
-        assert_eq!(samples("--spp 5"), 0..5);
-        assert_eq!(samples("--samples 5..9"), 5..9);
-    }
-
-    #[test]
-    fn only_first_hit_layers_cost_anything() {
-        let aovs = |line: &str| settings(&parse(line), &scene()).unwrap().aovs;
-        assert!(!aovs("--aov stderr,samples"));
-        assert!(aovs("--aov stderr,depth"));
-    }
 }

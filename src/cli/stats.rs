@@ -36,7 +36,7 @@ pub fn statistics(record: &Record, late: &LateTimes) -> Json {
     let report = record.report;
     root.insert("schema".into(), SCHEMA.into());
     // what must be text in a header
-    root["settings"]["seed"] = record.settings.seed.into();
+    root["settings"]["seed"] = record.job.settings.seed.into();
     let on = report.features.iter().filter(|f| f.on).map(|f| f.name);
     root.insert("features".into(), on.collect());
     root["times"]["write"] = late.write.into();

@@ -15,11 +15,22 @@ use crate::error::{Error, Result};
 /// # Errors
 /// [`Error::Io`]; the temporary file is then removed and the old file intact.
 pub fn write_bytes(path: &Path, bytes: &[u8]) -> Result<()> {
+    write_with(path, &mut |file| file.write_all(bytes))
+}
+
+/// As [`write_bytes`], with the bytes that `content` writes.
+///
+/// # Errors
+/// [`Error::Io`]; the temporary file is then removed and the old file intact.
+pub fn write_with(
+    path: &Path,
+    content: &mut dyn FnMut(&mut dyn Write) -> io::Result<()>,
+) -> Result<()> {
     if is_special(path) {
         return OpenOptions::new()
             .write(true)
             .open(path)
-            .and_then(|mut file| file.write_all(bytes))
+            .and_then(|mut file| content(&mut file))
             .map_err(|source| io_error("write", path, source));
     }
     let target = resolve(path);
@@ -28,7 +39,7 @@ pub fn write_bytes(path: &Path, bytes: &[u8]) -> Result<()> {
         if let Ok(old) = fs::metadata(&target) {
             temporary.file.set_permissions(old.permissions())?;
         }
-        temporary.file.write_all(bytes)?;
+        content(&mut temporary.file)?;
         temporary.file.sync_all()
     })();
     written.map_err(|source| io_error("write", path, source))?;

@@ -3,13 +3,14 @@
 
 mod atomic;
 mod exr;
+mod nodes;
 mod png;
 mod tone;
 
 use std::collections::BTreeMap;
 use std::path::Path;
 
-pub use atomic::{probe_writable, write_bytes};
+pub use atomic::{probe_writable, write_bytes, write_with};
 pub use exr::{read_exr, write_exr};
 pub use png::write_png;
 pub use tone::Tone;

@@ -27,7 +27,7 @@ use crate::settings::{BackendChoice, Settings};
 
 pub use meter::Reading;
 pub use report::{
-    Control, DeviceInfo, Feature, Ledger, Memory, Progress, Report, SceneModel, Times,
+    Control, DeviceInfo, Feature, Ledger, Memory, Progress, Report, SceneModel, Times, Work,
 };
 
 use pace::Pace;
@@ -172,24 +172,41 @@ impl Renderer {
     /// # Errors
     /// The device fails.
     pub fn render(&mut self, control: &mut dyn FnMut(&Progress) -> Control) -> Result<Film> {
-        let settings = &self.settings;
-        let mut film = Film::new(
-            settings.window(),
-            (settings.width, settings.height),
-            settings.aovs,
-        );
-        let samples = settings.samples.clone();
-        let total = samples.end - samples.start;
+        let film = Film::of(&self.settings);
+        let samples = self.settings.samples.clone();
+        self.resume(film, Work::default(), &[samples], control)
+    }
+
+    /// As [`Self::render`], but goes on with `film`, which `before` was spent on,
+    /// and renders what it lacks of `samples` (in order, disjoint). The film then
+    /// has the same bits as if it had been rendered at once.
+    ///
+    /// # Errors
+    /// The device fails, or the film is not one of these settings.
+    pub fn resume(
+        &mut self,
+        mut film: Film,
+        before: Work,
+        samples: &[Range<u64>],
+        control: &mut dyn FnMut(&Progress) -> Control,
+    ) -> Result<Film> {
+        // refuses a film of other settings, and says what differs
+        film.merge(Film::of(&self.settings))?;
+        let missing = film.missing(samples);
+        let samples_before = film.samples();
+        let total = samples_before + missing.iter().map(|r| r.end - r.start).sum::<u64>();
+        let mut work = before;
         let start = Instant::now();
-        self.backend.reset_ledger()?;
-        let mut passes = Passes::new(samples, self.tuning.max_pass);
+        let mut passes = Passes::new(missing, self.tuning.max_pass);
         while let Some((first, level)) = passes.upcoming() {
             let pass_start = Instant::now();
-            let done = passes.done() as f64;
+            let done = (samples_before + passes.done()) as f64;
             let size = (1u64 << level) as f64;
-            let mut tell = |share: f64, pass_complete: bool, film: &Film| {
+            let mut tell = |share: f64, pass_complete: bool, film: &Film, work: &Work| {
                 control(&Progress {
                     film,
+                    work: *work,
+                    samples_before,
                     samples_done: film.samples(),
                     samples_total: total,
                     fraction: (done + share * size) / total as f64,
@@ -197,19 +214,24 @@ impl Renderer {
                     elapsed: start.elapsed(),
                 })
             };
-            let mut between = |share: f64| tell(share, false, &film);
+            self.backend.reset_ledger()?;
+            let mut between = |share: f64| tell(share, false, &film, &work);
             let Some(values) = self.pass(first, level, &mut between)? else {
                 break;
             };
             film.add(first, level, values)?;
+            let (rays, ledger) = self.backend.ledger()?;
+            work.rays += rays;
+            work.ledger.add(&ledger);
+            work.seconds = before.seconds + start.elapsed().as_secs_f64();
             passes.finish(pass_start.elapsed().as_secs_f64(), PASS_SECONDS);
-            if tell(1.0, true, &film) == Control::Stop {
+            if tell(1.0, true, &film, &work) == Control::Stop {
                 break;
             }
         }
-        self.report.times.render = start.elapsed().as_secs_f64();
+        self.report.times.render = before.seconds + start.elapsed().as_secs_f64();
         self.report.paths = film.samples() * film.pixels() as u64;
-        (self.report.rays, self.report.ledger) = self.backend.ledger()?;
+        (self.report.rays, self.report.ledger) = (work.rays, work.ledger);
         self.report.memory.film = self.backend.memory().film + film.bytes();
         Ok(film)
     }

@@ -2,6 +2,7 @@
 //! tree: one sample first, so that something is there soon, then doubling as
 //! long as a pass stays short. The cut does not change the bits of the result.
 
+use std::collections::VecDeque;
 use std::ops::Range;
 
 /// log₂ of the most samples of a pass: what one invocation sums (FILM_LEVELS in film.glsl).
@@ -9,20 +10,19 @@ pub(crate) const MAX_PASS_LEVEL: u32 = 8;
 
 /// The passes that are left.
 pub(crate) struct Passes {
-    start: u64,
-    next: u64,
-    end: u64,
+    /// What is left, in order.
+    ranges: VecDeque<Range<u64>>,
+    done: u64,
     current: u32,
     limit: u32,
 }
 
 impl Passes {
-    /// All of `samples`, at most `max_pass` at a time.
-    pub fn new(samples: Range<u64>, max_pass: u64) -> Self {
+    /// All of some disjoint ranges of samples, at most `max_pass` at a time.
+    pub fn new(ranges: impl IntoIterator<Item = Range<u64>>, max_pass: u64) -> Self {
         Self {
-            start: samples.start,
-            next: samples.start,
-            end: samples.end,
+            ranges: ranges.into_iter().filter(|r| !r.is_empty()).collect(),
+            done: 0,
             current: 0,
             limit: max_pass.max(1).ilog2().min(MAX_PASS_LEVEL),
         }
@@ -30,21 +30,25 @@ impl Passes {
 
     /// First sample and log₂ of the number of samples of the next pass.
     pub fn upcoming(&mut self) -> Option<(u64, u32)> {
-        if self.next == self.end {
-            return None;
-        }
+        let Range { start, end } = *self.ranges.front()?;
         // A pass starts at a multiple of its size, ends inside the range and is
         // not larger than what is done already.
-        let aligned = self.next.trailing_zeros();
-        let inside = (self.end - self.next).ilog2();
-        let ramp = (self.done() + 1).ilog2();
+        let aligned = start.trailing_zeros();
+        let inside = (end - start).ilog2();
+        let ramp = (self.done + 1).ilog2();
         self.current = aligned.min(inside).min(ramp).min(self.limit);
-        Some((self.next, self.current))
+        Some((start, self.current))
     }
 
     /// Notes that the pass is complete and took `seconds`; keeps the next ones below `target` seconds.
     pub fn finish(&mut self, seconds: f64, target: f64) {
-        self.next += 1 << self.current;
+        self.done += 1 << self.current;
+        if let Some(range) = self.ranges.front_mut() {
+            range.start += 1 << self.current;
+            if range.is_empty() {
+                self.ranges.pop_front();
+            }
+        }
         if 2.0 * seconds > target {
             self.limit = self.limit.min(self.current);
         }
@@ -52,12 +56,14 @@ impl Passes {
 
     /// Samples of complete passes.
     pub fn done(&self) -> u64 {
-        self.next - self.start
+        self.done
     }
 }
 
 #[cfg(test)]
 mod tests {
+    use std::iter;
+
     use super::*;
 
     #[test]
@@ -69,7 +75,7 @@ mod tests {
             (0..1000, 1),
             (7..4096, 64),
         ] {
-            let mut passes = Passes::new(range.clone(), max);
+            let mut passes = Passes::new([range.clone()], max);
             let mut at = range.start;
             while let Some((first, level)) = passes.upcoming() {
                 assert_eq!(first, at);
@@ -83,8 +89,20 @@ mod tests {
     }
 
     #[test]
+    fn passes_skip_what_lies_between_ranges() {
+        let mut passes = Passes::new([3..6, 9..9, 12..13], 256);
+        let mut samples = Vec::new();
+        while let Some((first, level)) = passes.upcoming() {
+            samples.extend(first..first + (1 << level));
+            passes.finish(0.0, 1.0);
+        }
+        assert_eq!(samples, [3, 4, 5, 12]);
+        assert_eq!(passes.done(), 4);
+    }
+
+    #[test]
     fn slow_passes_do_not_grow() {
-        let mut passes = Passes::new(0..64, 256);
+        let mut passes = Passes::new(iter::once(0..64), 256);
         let mut longest = 0;
         while let Some((_, level)) = passes.upcoming() {
             longest = longest.max(level);

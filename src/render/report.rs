@@ -19,6 +19,10 @@ pub enum Control {
 pub struct Progress<'a> {
     /// The complete passes.
     pub film: &'a Film,
+    /// What they took.
+    pub work: Work,
+    /// Samples a pixel that were there before this run.
+    pub samples_before: u64,
     /// Samples a pixel in complete passes.
     pub samples_done: u64,
     /// Samples a pixel in all.
@@ -27,7 +31,7 @@ pub struct Progress<'a> {
     pub fraction: f64,
     /// Whether the batch completed a pass.
     pub pass_complete: bool,
-    /// Since the first sample.
+    /// Since the first sample of this run.
     pub elapsed: Duration,
 }
 
@@ -75,6 +79,27 @@ pub struct Ledger {
     pub truncated_throughput: f64,
     /// Solids that were entered while the most that are tracked already held the point; their boundaries were missed.
     pub interior_overflows: u64,
+}
+
+impl Ledger {
+    /// Adds what happened in other samples.
+    pub fn add(&mut self, other: &Self) {
+        self.non_finite += other.non_finite;
+        self.truncated_paths += other.truncated_paths;
+        self.truncated_throughput += other.truncated_throughput;
+        self.interior_overflows += other.interior_overflows;
+    }
+}
+
+/// What was done for the samples of a film, over all runs that it took.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Work {
+    /// Rays traced.
+    pub rays: u64,
+    /// Seconds between the first and the last sample, breaks excluded.
+    pub seconds: f64,
+    /// What may have changed the expected value.
+    pub ledger: Ledger,
 }
 
 /// How a render went.

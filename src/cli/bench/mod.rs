@@ -24,7 +24,8 @@ use etendue::scene::Scene;
 use etendue::settings::Settings;
 
 use super::failure::{FAILED, Failure, Outcome, USAGE};
-use super::render::{frame, load_scene};
+use super::render::load_scene;
+use super::settings::frame;
 use super::write_stderr;
 use args::BenchArgs;
 use contest::Contest;

@@ -1,0 +1,100 @@
+//! Films in images: a mean is rounded, so images that are to be merged carry the
+//! sums themselves, a layer `node.FIRST.LEVEL` for each node of the film.
+
+use super::{Channel, Image};
+use crate::film::Film;
+
+/// Before the names of the layers.
+const PREFIX: &str = "node.";
+
+/// The floats of a pixel in a node, in order; the first six where a film has no sums of the first hit.
+const PARTS: [&str; 14] = [
+    "sum.R",
+    "sum.G",
+    "sum.B",
+    "deviations.R",
+    "deviations.G",
+    "deviations.B",
+    "albedo.R",
+    "albedo.G",
+    "albedo.B",
+    "normal.X",
+    "normal.Y",
+    "normal.Z",
+    "depth.Z",
+    "coverage",
+];
+
+impl Image {
+    /// Adds the nodes of the film that the image was made of.
+    pub fn push_nodes(&mut self, film: &Film) {
+        let stride = film.floats_per_pixel();
+        for (first, level, values) in film.nodes() {
+            for (offset, part) in PARTS[..stride].iter().enumerate() {
+                self.channels.push(Channel {
+                    name: format!("{PREFIX}{first}.{level}.{part}"),
+                    values: values[offset..].iter().step_by(stride).copied().collect(),
+                });
+            }
+        }
+    }
+
+    /// The film that the image was made of, if it has nodes.
+    ///
+    /// # Errors
+    /// What is wrong: there are no nodes, they are not complete, or the picture is not theirs.
+    pub fn film(&self) -> Result<Film, String> {
+        let mut nodes: Vec<(u64, u32)> = Vec::new();
+        for channel in &self.channels {
+            if let Some(name) = channel.name.strip_prefix(PREFIX) {
+                let node = node(name).ok_or_else(|| format!("{} is no node", channel.name))?;
+                nodes.push(node);
+            }
+        }
+        nodes.sort_unstable();
+        nodes.dedup();
+        let Some((first, level)) = nodes.first() else {
+            return Err(String::from(
+                "has no sums to merge: those are stored where --samples was given",
+            ));
+        };
+        let last = PARTS[PARTS.len() - 1];
+        let aovs = self
+            .channel(&format!("{PREFIX}{first}.{level}.{last}"))
+            .is_some();
+        let mut film = Film::new(self.window, self.full, aovs);
+        for (first, level) in nodes {
+            let values = self.node_values(first, level, film.floats_per_pixel())?;
+            film.add(first, level, values).map_err(|e| e.to_string())?;
+        }
+        let same = |a: &[f32; 3], b: &[f32; 3]| a.map(f32::to_bits) == b.map(f32::to_bits);
+        let (is, should) = (self.rgb().unwrap_or_default(), film.mean());
+        if is.len() != should.len() || !is.iter().zip(&should).all(|(a, b)| same(a, b)) {
+            return Err(String::from("R, G, B are not the mean of its sums"));
+        }
+        Ok(film)
+    }
+
+    /// The floats of a node, pixel by pixel.
+    fn node_values(&self, first: u64, level: u32, stride: usize) -> Result<Vec<f32>, String> {
+        let (width, height) = self.size();
+        let mut values = vec![0.0; width * height * stride];
+        for (offset, part) in PARTS[..stride].iter().enumerate() {
+            let name = format!("{PREFIX}{first}.{level}.{part}");
+            let channel = self.channel(&name);
+            let channel = channel.ok_or_else(|| format!("{name} is missing"))?;
+            for (to, &from) in values[offset..].iter_mut().step_by(stride).zip(channel) {
+                *to = from;
+            }
+        }
+        Ok(values)
+    }
+}
+
+/// First sample and level of `FIRST.LEVEL.PART`.
+fn node(name: &str) -> Option<(u64, u32)> {
+    let (first, rest) = name.split_once('.')?;
+    let (level, part) = rest.split_once('.')?;
+    let known = PARTS.contains(&part);
+    known.then_some((first.parse().ok()?, level.parse().ok()?))
+}

@@ -1,0 +1,201 @@
+//! Renders that stop anywhere and go on: by a limit, by a signal, by `kill -9`.
+
+use std::fs;
+use std::process::Stdio;
+use std::slice;
+use std::time::Duration;
+
+use etendue::checkpoint;
+use etendue::film::Film;
+use etendue::image_io::{Metadata, read_exr};
+use etendue::render::{Control, Work};
+
+use super::support::{
+    command, etendue, has_device, list, number, read, render, scene, stderr, text, wait_for_samples,
+};
+use super::{bits, example, hash, renderer, rounds};
+
+/// Stops after a random batch, saves, reads and goes on, until all is there.
+#[test]
+fn any_stop_point_gives_the_same_bits() {
+    if !has_device() {
+        return;
+    }
+    let folder = scene();
+    let path = folder.path().join("c");
+    let square = folder.path().join("scene.gltf");
+    for scene in [square.to_str().unwrap(), &example("cornell")] {
+        let (mut renderer, settings) = renderer(scene);
+        let mut batches = 0;
+        let whole = renderer.render(&mut |_| {
+            batches += 1;
+            Control::Continue
+        });
+        let (whole, report) = (whole.unwrap(), renderer.report());
+        let mut stops = 0;
+        for round in 0..rounds(12) {
+            let (mut film, mut work) = (Film::of(&settings), Work::default());
+            while film.samples() < 100 {
+                stops += 1;
+                let mut left = hash(round * 1000 + stops) % batches;
+                let samples = [settings.samples.clone()];
+                let result = renderer.resume(film, work, &samples, &mut |progress| {
+                    work = progress.work;
+                    left = left.saturating_sub(1);
+                    match left {
+                        0 => Control::Stop,
+                        _ => Control::Continue,
+                    }
+                });
+                checkpoint::write(&path, &Metadata::new(), &result.unwrap()).unwrap();
+                film = checkpoint::read(&path).unwrap().1;
+            }
+            assert!(bits(&film) == bits(&whole), "round {round} of {scene}");
+            assert_eq!(work.rays, report.rays);
+            assert_eq!(work.ledger.truncated_paths, report.ledger.truncated_paths);
+        }
+        assert!(stops > rounds(12), "nothing was ever stopped");
+    }
+}
+
+#[test]
+fn a_film_of_other_settings_is_refused() {
+    if !has_device() {
+        return;
+    }
+    let (mut renderer, mut settings) = renderer(&example("cornell"));
+    settings.width += 1;
+    let film = Film::of(&settings);
+    let result = renderer.resume(film, Work::default(), slice::from_ref(&(0..1)), &mut |_| {
+        Control::Continue
+    });
+    assert!(result.is_err());
+}
+
+#[test]
+fn the_program_goes_on_from_its_checkpoint() {
+    if !has_device() {
+        return;
+    }
+    let folder = scene();
+    let all = "--width 32 --aov stderr,albedo --max-depth 3";
+    render(&folder, &format!("-o whole.exr {all} --spp 48"));
+    // what was rendered with fewer samples goes on to more
+    let saved = format!("{all} --checkpoint c.ck --resume");
+    let output = render(&folder, &format!("-o a.exr {saved} --spp 7"));
+    assert!(
+        stderr(&output).contains("no c.ck yet"),
+        "{}",
+        stderr(&output)
+    );
+    let output = render(
+        &folder,
+        &format!("-o a.exr {saved} --spp 48 --stats s.json"),
+    );
+    assert!(stderr(&output).contains("going on from samples 0..7"));
+    let (whole, a) = (read(&folder, "whole.exr"), read(&folder, "a.exr"));
+    assert!(whole.channels == a.channels);
+    for (name, value) in &whole.metadata {
+        let is_time = name.starts_with("times.");
+        assert!(is_time || a.metadata.get(name) == Some(value), "{name}");
+    }
+    // the paths of both runs
+    let stats = fs::read(folder.path().join("s.json")).unwrap();
+    let stats: serde_json::Value = serde_json::from_slice(&stats).unwrap();
+    let seconds = stats["times"]["render"].as_f64().unwrap();
+    let paths = stats["paths_per_second"].as_f64().unwrap() * seconds;
+    assert!((paths - 48.0 * 32.0 * 16.0).abs() < 0.5, "{paths} paths");
+
+    // finished work is neither done again nor thrown away
+    render(&folder, &format!("-o b.exr {saved} --spp 48"));
+    assert!(read(&folder, "b.exr").channels == a.channels);
+    let line = format!("render scene.gltf -o b.exr {all} --spp 48 --checkpoint c.ck");
+    let output = etendue(&line, folder.path());
+    assert_eq!(output.status.code(), Some(2));
+    assert!(stderr(&output).contains("--resume"), "{}", stderr(&output));
+}
+
+#[cfg(unix)]
+#[test]
+fn signals_leave_a_checkpoint_and_what_is_finished() {
+    if !has_device() {
+        return;
+    }
+    for signal in ["INT", "TERM"] {
+        let folder = scene();
+        let line = "render scene.gltf -o a.exr --spp 100000000 --width 16 --checkpoint c.ck";
+        let mut child = command(&format!("{line} --progress json"), folder.path())
+            .stderr(Stdio::piped())
+            .spawn()
+            .unwrap();
+        wait_for_samples(&mut child);
+        kill(signal, child.id());
+        let output = child.wait_with_output().unwrap();
+        assert_eq!(output.status.code(), Some(130), "{}", stderr(&output));
+        assert_eq!(list(folder.path()), ["a.exr", "c.ck", "scene.gltf"]);
+        let image = read(&folder, "a.exr");
+        let (header, film) = checkpoint::read(&folder.path().join("c.ck")).unwrap();
+        assert_eq!(film.samples() as f64, number(&image, "spp"));
+        assert_eq!(text(&image, "ledger.stop"), "interrupt");
+        assert_eq!(header["scene_hash"], image.metadata["scene_hash"]);
+        assert!(film.mean() == image.rgb().unwrap());
+    }
+}
+
+/// Whatever is found after `kill -9` is complete, no checkpoint is lost, and what
+/// goes on from it ends with the same picture.
+#[cfg(unix)]
+#[test]
+fn killed_renders_leave_complete_files() {
+    if !has_device() {
+        return;
+    }
+    let folder = scene();
+    let all = "--width 64 --spp 2000";
+    render(&folder, &format!("-o whole.exr {all}"));
+    let line = format!(
+        "render scene.gltf -o a.exr -o a.png --stats s.json {all} -q \
+         --checkpoint c.ck --resume --checkpoint-interval 0"
+    );
+    let path = |name: &str| folder.path().join(name);
+    let mut held = 0;
+    for round in 0..rounds(6) {
+        let mut child = command(&line, folder.path()).spawn().unwrap();
+        std::thread::sleep(Duration::from_millis(300 + hash(round) % 1200));
+        // SIGKILL; a render that is done already does not mind
+        child.kill().unwrap();
+        child.wait().unwrap();
+        if path("c.ck").exists() {
+            let (_, film) = checkpoint::read(&path("c.ck")).unwrap();
+            assert!(film.samples() >= held, "round {round}");
+            held = film.samples();
+        }
+        if path("a.exr").exists() {
+            read_exr(&path("a.exr")).unwrap();
+        }
+        if path("a.png").exists() {
+            image::open(path("a.png")).unwrap();
+        }
+        if path("s.json").exists() {
+            let text = fs::read(path("s.json")).unwrap();
+            serde_json::from_slice::<serde_json::Value>(&text).unwrap();
+        }
+        if held == 2000 {
+            // start anew
+            fs::remove_file(path("c.ck")).unwrap();
+            held = 0;
+        }
+    }
+    let output = command(&line, folder.path()).output().unwrap();
+    assert!(output.status.success(), "{}", stderr(&output));
+    assert!(read(&folder, "a.exr").channels == read(&folder, "whole.exr").channels);
+}
+
+#[cfg(unix)]
+fn kill(signal: &str, process: u32) {
+    let kill = format!("kill -{signal} {process}");
+    let sent = std::process::Command::new("sh")
+        .args(["-c", &kill])
+        .status();
+    assert!(sent.unwrap().success());
+}
