@@ -7,13 +7,13 @@
 //! Pixels of a path tracer are skewed: most samples are dark and a few are bright, and the bright ones that did not come
 //! are missing in the mean and in its standard error alike. A normal law would raise many false alarms. So:
 //!
-//! - A region's sum is judged by Student's t with the degrees of freedom of Satterthwaite [Satterthwaite46],
+//! - A region's sum is judged by Student's t with the degrees of freedom of Satterthwaite \[Satterthwaite46\],
 //!   ν = 2(Σv)²/Σv², as if the variance of each pixel were known no better than by one normal variable. Where few pixels carry
 //!   the noise, ν is small and the test nearly blind, as it must be.
 //! - Both images estimate the noise of one sample; the larger one counts for both, scaled by the numbers of samples. So a reference that has seen the
 //!   rare events speaks for the image that has not.
 //! - N equal samples have no variance and need not be exact: d²/N is added to each pixel's variance.
-//! - A pixel is judged by 2 exp(−t²/2), which bounds self-normalised sums of symmetric variables of any distribution [Efron69], and t² cannot
+//! - A pixel is judged by 2 exp(−t²/2), which bounds self-normalised sums of symmetric variables of any distribution \[Efron69\], and t² cannot
 //!   exceed N. With some dozens of samples it sees nothing but gross errors, and that is all there is to see.
 
 mod metrics;

@@ -68,7 +68,7 @@ fn beta(a: f64, b: f64, x: f64, y: f64) -> f64 {
     }
 }
 
-/// The continued fraction of the incomplete beta function by Lentz's method [Press07] §6.4.
+/// The continued fraction of the incomplete beta function by Lentz's method \[Press07\] §6.4.
 fn fraction(a: f64, b: f64, x: f64) -> f64 {
     let guard = |v: f64| if v.abs() < 1e-300 { 1e-300 } else { v };
     let mut c = 1.0;

@@ -106,7 +106,7 @@ fn aces(v: [f32; 3]) -> [f32; 3] {
     transform(OUTPUT, fitted)
 }
 
-/// [Sobotka22] as fitted in [Wrensch23]: linear Rec. 709 to linear display values.
+/// \[Sobotka22\] as fitted in [Wrensch23]: linear Rec. 709 to linear display values.
 fn agx(v: [f32; 3]) -> [f32; 3] {
     const INSET: [[f32; 3]; 3] = [
         [0.842_479_05, 0.078_433_6, 0.079_223_745],
@@ -186,7 +186,7 @@ mod tests {
     }
 
     /// [Sobotka22]: the curve's pivot takes 0.18 (10 of 16.5 stops) to the code 0.5.
-    /// [Wrensch23] gives the fit's mean squared error as 3.67e-6; allowed is three times its root.
+    /// \[Wrensch23\] gives the fit's mean squared error as 3.67e-6; allowed is three times its root.
     #[test]
     fn agx_puts_middle_grey_in_the_middle() {
         let code = agx([0.18; 3])[0].powf(1.0 / 2.2);

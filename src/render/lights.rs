@@ -1,7 +1,7 @@
 //! Emitters as the kernels sample them: the alias table over emissive triangles
 //! and punctual lights, and the one over the texels of an environment map.
 //!
-//! [Vose91] Vose, A Linear Algorithm for Generating Random Numbers with a Given
+//! \[Vose91\] Vose, A Linear Algorithm for Generating Random Numbers with a Given
 //! Distribution, IEEE TSE 17(9).
 
 use std::f64::consts::PI;
@@ -96,7 +96,7 @@ pub(crate) fn table(emitters: Vec<Emitter>, is_uniform: bool) -> LightTable {
     LightTable { lights, total }
 }
 
-/// Walker's alias table: entry i is kept with probability `.0`, else `.1` is taken. [Vose91]
+/// Walker's alias table: entry i is kept with probability `.0`, else `.1` is taken. \[Vose91\]
 pub(crate) fn alias_table(weights: &[f64]) -> Vec<(f32, u32)> {
     let total: f64 = weights.iter().sum();
     let scale = weights.len() as f64 / total;
