@@ -140,7 +140,8 @@ impl Samples {
 
     fn image(&mut self, samples: u64) -> Image {
         self.next = self.next.next_multiple_of(samples);
-        self.renderer.set_samples(self.next..self.next + samples);
+        let range = self.next..self.next + samples;
+        self.renderer.restart(range, 0).unwrap();
         self.next += samples;
         let film = self.renderer.render(&mut |_| Control::Continue).unwrap();
         Image::from_film(&film, &[Aov::StandardError, Aov::Samples], Metadata::new()).unwrap()

@@ -279,12 +279,6 @@ impl Renderer {
         Ok(Some(values))
     }
 
-    /// Renders these samples from now on; what was compiled and uploaded stays.
-    #[doc(hidden)]
-    pub fn set_samples(&mut self, samples: Range<u64>) {
-        self.settings.samples = samples;
-    }
-
     /// How the render went.
     pub fn report(&self) -> Report {
         self.report.clone()

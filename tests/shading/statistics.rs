@@ -1,5 +1,7 @@
 //! χ² with pooling, its tail, and Šidák's share of a false alarm.
 
+use etendue::compare::tails::ln_gamma;
+
 /// Chance that a correct renderer fails a test function, all its tests of chance together.
 pub const FALSE_ALARM: f64 = 1e-3;
 
@@ -90,18 +92,6 @@ pub fn chi_square_tail(x: f64, degrees: usize) -> f64 {
         }
     }
     scale * h
-}
-
-/// ln Γ(x) for x > 0: Stirling's series after shifting x above 10 (error below 1e-13).
-fn ln_gamma(mut x: f64) -> f64 {
-    let mut shift = 0.0;
-    while x < 10.0 {
-        shift -= x.ln();
-        x += 1.0;
-    }
-    let y = 1.0 / (x * x);
-    let series = (1.0 / 12.0 - y * (1.0 / 360.0 - y * (1.0 / 1260.0 - y / 1680.0))) / x;
-    shift + (x - 0.5) * x.ln() - x + 0.5 * (2.0 * std::f64::consts::PI).ln() + series
 }
 
 /// The p-values of one test function; asserts all of them at once.
