@@ -164,6 +164,28 @@ pub fn cube() -> Mesh {
     mesh(positions, triangles)
 }
 
+/// A prism of height 2 and radius 0.9 about the y axis, normals outwards: the more sides, the thinner its triangles.
+pub fn prism(sides: u32) -> Mesh {
+    let ring = |y: f32| {
+        (0..sides).map(move |i| {
+            let (sine, cosine) =
+                (std::f64::consts::TAU * f64::from(i) / f64::from(sides)).sin_cos();
+            Vec3::new((0.9 * cosine) as f32, y, (-0.9 * sine) as f32)
+        })
+    };
+    let centres = [Vec3::NEG_Y, Vec3::Y];
+    let positions = ring(-1.0).chain(ring(1.0)).chain(centres).collect();
+    let triangles = (0..sides)
+        .flat_map(|a| {
+            let b = (a + 1) % sides;
+            let (c, d) = (a + sides, b + sides);
+            let (low, high) = (2 * sides, 2 * sides + 1);
+            [[a, b, d], [a, d, c], [b, a, low], [c, d, high]]
+        })
+        .collect();
+    mesh(positions, triangles)
+}
+
 /// An icosahedron split `splits` times; every vertex is shared and has distance 1 from the origin.
 pub fn icosphere(splits: u32) -> Mesh {
     let g = 0.5 * (1.0 + 5f64.sqrt());
