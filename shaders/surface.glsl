@@ -64,7 +64,8 @@ uvec4 surface_triangle(uint instance, uint primitive)
     return texelFetch(triangles, int(first + primitive));
 }
 
-// Largest share of the edges by which the plane of a thin triangle is taken to be off.
+// Squares of edges over area up to which a triangle is not thin, and beyond which no more is added.
+const float PLAIN_THINNESS = 8.0;
 const float MAX_THINNESS = 1.0e4;
 
 // Bound on the error of each component of a point computed by the edge form,
@@ -72,13 +73,14 @@ const float MAX_THINNESS = 1.0e4;
 // at which a traversal meets the triangle. A point may gain as much
 // across the plane as the edges are long: the largest component of the edges
 // enters everywhere, so that an axis-aligned plane through 0 is left as well.
-// The plane of a thin triangle is lost by edge² over area, since weights are:
-// an eighth of it held for 1.5e7 rays from triangles up to 5000 times as long as high.
+// The plane of a thin triangle is lost by edge² over area, since weights are: an
+// eighth of what that exceeds the plain held for 1.6e7 rays from triangles 5 to 2000 times as long as high.
 vec3 surface_error(vec3 magnitude, vec3 e1, vec3 e2)
 {
     float edge = max_component(abs(e1) + abs(e2));
     float thinness = min(edge * (edge / length(cross(e1, e2))), MAX_THINNESS);
-    return vec3(POSITION_ROUNDINGS * EPSILON) * (magnitude + (0.25 + 0.125 * thinness) * edge);
+    float share = 0.25 + 0.125 * max(thinness - PLAIN_THINNESS, 0.0);
+    return vec3(POSITION_ROUNDINGS * EPSILON) * (magnitude + share * edge);
 }
 
 TriangleShape surface_shape(uint instance, uvec4 triangle)
