@@ -66,18 +66,28 @@ Shadow shadow_none()
     return Shadow(false, vec3(0.0), interior_empty(), Ray(vec3(0.0), vec3(0.0)), NONE, 0.0, 0.0, false, vec3(0.0));
 }
 
-// Distance left from `origin` to the light; 0 where it is reached.
-float shadow_reach(Shadow s, vec3 origin)
+// Sends the shadow ray on from `origin`. It aims at the light anew: a step off a large
+// surface may be longer than the distance at which rays stop short of a small lamp.
+void shadow_aim(inout Shadow s, vec3 origin)
 {
-    return s.is_infinite ? T_FAR : max(dot(s.target - origin, s.ray.direction), 0.0);
+    s.ray.origin = origin;
+    if (s.is_infinite) {
+        s.t_max = T_FAR;
+        return;
+    }
+    vec3 to = s.target - origin;
+    bool is_reached = dot(to, s.ray.direction) <= 0.0;
+    s.t_max = is_reached ? 0.0 : length(to);
+    if (s.t_max > 0.0) {
+        s.ray.direction = to / s.t_max;
+    }
 }
 
 Shadow shadow_of(Interior interior, vec3 origin, uint from, LightSample light, vec3 value)
 {
-    vec3 to = light.target - origin;
-    float t_max = light.is_infinite ? T_FAR : length(to);
-    vec3 d = light.is_infinite || !(t_max > 0.0) ? light.wi : to / t_max;
-    return Shadow(true, value, interior, Ray(origin, d), from, 0.0, t_max, light.is_infinite, light.target);
+    Shadow s = Shadow(true, value, interior, Ray(origin, light.wi), from, 0.0, 0.0, light.is_infinite, light.target);
+    shadow_aim(s, origin);
+    return s;
 }
 
 // Whether all of the light arrives, where surfaces let through all or nothing.

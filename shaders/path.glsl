@@ -229,10 +229,9 @@ void path_shadow(inout PathState path, inout PathResult result, bool is_hit, Sur
     if (is_hit) {
         path.shadow.value *= through;
         vec3 origin = offset_origin(s.position, s.error, -s.ng);
-        path.shadow.ray.origin = origin;
+        shadow_aim(path.shadow, origin);
         path.shadow.from = s.record;
         path.shadow.lead = dot(origin - s.position, path.shadow.ray.direction);
-        path.shadow.t_max = shadow_reach(path.shadow, origin);
         path.shadow.interior = beyond;
         is_done = path.shadow.t_max == 0.0 || max_component(path.shadow.value) <= 0.0;
     }

@@ -105,6 +105,14 @@ fn lamp_behind_a_pane() {
     }
 }
 
+/// Rays step off a pane by its own size's rounding, a thousand times that of the lamp, and reach the lamp all the same.
+#[test]
+fn small_lamp_behind_a_wide_pane() {
+    let pane = square(Vec3::new(0.0, 1.2, 0.0), Vec3::Y, 600.0);
+    let scene = scene_with(Some((pane, sheet(1.5), DAffine3::IDENTITY)));
+    assert_counted_once("wide", &scene, [2048, 2048, 8192], 2e-2);
+}
+
 #[test]
 fn lamp_in_fog_behind_a_boundary() {
     let medium = grey(0.05, 0.4, Phase::HenyeyGreenstein { g: 0.3 });
