@@ -120,6 +120,12 @@ float direct_found_weight(Flight flight, float pdf_phase, float pdf_light, vec3 
     return 1.0 / (1.0 + ratio * ratio * (1.0 + equiangular * equiangular));
 }
 
+// Lights are chosen for the whole segment: both ways of drawing the distance then choose alike.
+LightView direct_view(Flight flight)
+{
+    return LightView(flight.origin, flight.direction, flight.end);
+}
+
 // Light that may arrive, and how much if nothing is in the way.
 struct DirectLight {
     LightSample light;
@@ -132,7 +138,7 @@ DirectLight direct_in_medium(Medium medium, Flight flight, vec4 u)
 {
     DirectLight direct;
     direct.at = flight.origin + flight.distance * flight.direction;
-    direct.light = light_sample(direct.at, u);
+    direct.light = light_sample(direct.at, direct_view(flight), u);
     float phase = phase_value(medium, flight.direction, direct.light.wi);
     float weight = direct_light_weight(direct.light.is_delta, direct.light.pdf, phase);
     if (HAS_EQUIANGULAR && !direct.light.is_infinite && weight > 0.0) {
@@ -150,7 +156,7 @@ DirectLight direct_along(Medium medium, Flight flight, vec4 u, float u_distance)
 {
     // The same numbers choose the same point of the same light from anywhere.
     DirectLight direct;
-    direct.light = light_sample(flight.origin, u);
+    direct.light = light_sample(flight.origin, direct_view(flight), u);
     direct.value = vec3(0.0);
     direct.at = flight.origin;
     if (direct.light.is_infinite) {
@@ -160,7 +166,7 @@ DirectLight direct_along(Medium medium, Flight flight, vec4 u, float u_distance)
     float distance = equiangular_sample(e, flight.end, u_distance);
     float pdf = equiangular_pdf(e, distance);
     direct.at = flight.origin + distance * flight.direction;
-    direct.light = light_sample(direct.at, u);
+    direct.light = light_sample(direct.at, direct_view(flight), u);
     float phase = phase_value(medium, flight.direction, direct.light.wi);
     // 1/w = 1 + (density by distance / density by angle)² / w_direction, as in direct_in_medium.
     float weight = direct_light_weight(direct.light.is_delta, direct.light.pdf, phase);

@@ -17,7 +17,7 @@ const uint FILM_LEVELS = 9u;
 
 struct FilmNode {
     vec3 sum;        // of radiance
-    vec3 m2;         // squared deviations from the node's mean
+    vec3 m2;         // squared deviations from the node's mean; of blocks where there are two
     vec3 albedo;     // sums over the first hits
     vec3 normal;
     float depth;
@@ -30,7 +30,12 @@ FilmNode film_merge(FilmNode a, FilmNode b, float count)
     FilmNode r;
     precise vec3 sum = a.sum + b.sum;
     precise vec3 d = a.sum - b.sum;
-    precise vec3 m2 = (a.m2 + b.m2) + (d * d) * (1.0 / (2.0 * count));
+    precise vec3 within = a.m2 + b.m2;
+    // Samples of a block are not independent: what counts is how blocks differ.
+    if (HAS_STRATA && count == float(1u << BLOCK_LEVEL)) {
+        within = vec3(0.0);
+    }
+    precise vec3 m2 = within + (d * d) * (1.0 / (2.0 * count));
     r.sum = sum;
     r.m2 = m2;
     if (HAS_AOVS) {

@@ -43,6 +43,11 @@ struct Params {
     float env_cos_rotation;
     float env_sin_rotation;
     uint bvh_root;           // first node of the top level (of the only level without instances)
+    // With HAS_LIGHT_TREE:
+    float tree_choice;       // probability that direct light samples the tree; table_choice is then for distant lights
+    uint light_nodes;        // texels in `lights`: of the root …
+    uint light_keys;         // … and of the first key
+    uint light_key_count;    // emissive triangles
 };
 
 // --- Push constants: one per batch -----------------------------------------
@@ -194,6 +199,14 @@ struct Light {
     float emission_pdf;         // triangle: as Material's
 };
 const uint LIGHT_TEXELS = 6u;
+// With HAS_LIGHT_TREE the lights of the tree follow those of the table, leaf by leaf with an alias table each, then nodes of four
+// texels, two for each child: (centre, radius), (packed axis, cosine of the cone, power, link). A link
+// is a node or LIGHT_LEAF | lights of the leaf − 1 (three bits) | its first light. Keys of one texel, sorted: placement, triangle,
+// the way to the leaf (a bit for each step, the first one lowest), power of the leaf.
+const uint LIGHT_NODE_TEXELS = 4u;
+const uint LIGHT_LEAF = 0x80000000u;
+const uint LIGHT_LEAF_COUNT_SHIFT = 28u;
+const uint LIGHT_LEAF_FIRST_MASK = 0x0FFFFFFFu;
 const uint LIGHT_PLAIN = 0x80000000u;        // `intensity` is all: no texture, vertex colour or alpha enters
 const uint LIGHT_DOUBLE_SIDED = 0x40000000u; // emits from both sides
 const uint LIGHT_MIRRORED = 0x20000000u;     // the front sees its corners clockwise
@@ -243,6 +256,8 @@ const uint LEDGER_INTERIOR_OVERFLOWS = 6u;
 const uint LEDGER_SIZE = 7u;
 
 const uint TILE = 8u;
+// log₂ of the samples of a block, with HAS_STRATA.
+const uint BLOCK_LEVEL = 4u;
 
 // --- Bindings: one descriptor set ---------------------------------------------------
 

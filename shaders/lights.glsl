@@ -1,6 +1,7 @@
 // Direct light: choose an emitter, sample a point or direction on it, and the
 // density of the same for directions that the BSDF chose. Emissive triangles and
-// punctual lights share one alias table; the environment map is chosen beside it.
+// punctual lights share one alias table, or with HAS_LIGHT_TREE a tree, which leaves the distant
+// ones to the table; the environment map is chosen beside them.
 //
 // [Veach97] Veach, Robust Monte Carlo Methods for Light Transport Simulation, §8.
 
@@ -8,6 +9,7 @@
 #define LIGHTS_GLSL
 
 #include "environment.glsl"
+#include "light_tree.glsl"
 #include "surface.glsl"
 
 // A way for light to reach a point.
@@ -21,15 +23,21 @@ struct LightSample {
 };
 
 // Density per steradian at which direct light would have sampled a point of an
-// emissive triangle that the BSDF found, `distance2` away.
-float light_triangle_pdf(SurfacePoint s, vec3 wo, float distance2)
+// emissive triangle that the BSDF found, `distance2` away, for a view.
+float light_triangle_pdf(SurfacePoint s, vec3 wo, float distance2, LightView view)
 {
-    float pdf_area = params.light_uniform > 0.0 ? params.light_uniform / s.area : s.emission_pdf;
+    float pdf_area = s.emission_pdf;
+    if (HAS_LIGHT_TREE) {
+        pdf_area *= params.tree_choice * light_tree_density(view, s.placement, s.triangle);
+    } else {
+        pdf_area = params.table_choice * (params.light_uniform > 0.0 ? params.light_uniform / s.area : pdf_area);
+    }
     float cosine = abs(dot(s.ng, wo));
-    return cosine > 0.0 ? params.table_choice * pdf_area * distance2 / cosine : 0.0;
+    return cosine > 0.0 ? pdf_area * distance2 / cosine : 0.0;
 }
 
-LightSample light_sample_triangle(Light light, vec3 from, vec2 u)
+// `choice` is the probability of the list that the light is in.
+LightSample light_sample_triangle(Light light, vec3 from, vec2 u, float choice)
 {
     LightSample s;
     s.pdf = 0.0;
@@ -67,17 +75,17 @@ LightSample light_sample_triangle(Light light, vec3 from, vec2 u)
         }
     }
     float density = params.light_uniform > 0.0 ? params.light_uniform / (0.5 * doubled_area) : light.emission_pdf;
-    s.pdf = params.table_choice * density * distance2 / abs(cosine);
+    s.pdf = choice * density * distance2 / abs(cosine);
     return s;
 }
 
-LightSample light_sample_punctual(Light light, vec3 from)
+LightSample light_sample_punctual(Light light, vec3 from, float choice)
 {
     LightSample s;
     s.is_delta = true;
     s.is_infinite = light.kind == LIGHT_DIRECTIONAL;
     s.target = light.position;
-    s.pdf = params.table_choice * light.choice;
+    s.pdf = choice * light.choice;
     if (s.is_infinite) {
         s.wi = -light.direction;
         s.radiance = light.intensity;
@@ -98,9 +106,9 @@ LightSample light_sample_punctual(Light light, vec3 from)
     return s;
 }
 
-// A light for the point `from`. pdf 0 stands for "none this time". The same u stands
-// for the same point of the same light whatever `from` is.
-LightSample light_sample(vec3 from, vec4 u)
+// A light for the point `from`, chosen for the view. pdf 0 stands for "none this time". For one
+// view the same u stands for the same point of the same light whatever `from` is.
+LightSample light_sample(vec3 from, LightView view, vec4 u)
 {
     LightSample s;
     s.pdf = 0.0;
@@ -116,18 +124,37 @@ LightSample light_sample(vec3 from, vec4 u)
             s.pdf = e.pdf;
             return s;
         }
-        choice = (choice - params.env_choice) / params.table_choice;
+        choice -= params.env_choice;
     }
-    if ((!HAS_AREA_LIGHTS && !HAS_PUNCTUAL) || params.light_count == 0u) {
+    float probability = params.table_choice;
+    uint count = params.light_count;
+    uint index = 0u;
+    if (HAS_LIGHT_TREE) {
+        if (choice < params.tree_choice) {
+            choice /= params.tree_choice;
+            uint leaf = light_descend(view, choice, probability);
+            if (probability == 0.0) {
+                return s;
+            }
+            probability *= params.tree_choice;
+            index = leaf & LIGHT_LEAF_FIRST_MASK;
+            count = (leaf >> LIGHT_LEAF_COUNT_SHIFT & 7u) + 1u;
+        } else {
+            choice = (choice - params.tree_choice) / params.table_choice;
+        }
+    } else if (HAS_ENVIRONMENT) {
+        choice /= params.table_choice;
+    }
+    if ((!HAS_AREA_LIGHTS && !HAS_PUNCTUAL) || count == 0u) {
         return s;
     }
-    uint index = min(uint(choice * float(params.light_count)), params.light_count - 1u);
+    index += min(uint(choice * float(count)), count - 1u);
     uvec4 entry = texelFetch(lights, int(LIGHT_TEXELS * index));
     Light light = scene_light(u.w < uintBitsToFloat(entry.z) ? index : entry.y);
     if (HAS_AREA_LIGHTS && (!HAS_PUNCTUAL || light.kind == LIGHT_TRIANGLE)) {
-        return light_sample_triangle(light, from, u.yz);
+        return light_sample_triangle(light, from, u.yz, probability);
     }
-    return light_sample_punctual(light, from);
+    return light_sample_punctual(light, from, probability);
 }
 
 #endif

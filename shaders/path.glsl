@@ -173,6 +173,13 @@ float path_found_weight(PathState path, float pdf_light, vec3 point, bool is_inf
     return direct_bsdf_weight(path.pdf, pdf_light);
 }
 
+// What direct light was chosen for at the last scattering.
+LightView path_view(PathState path)
+{
+    bool is_medium = HAS_SCATTERING && path.flight.pdf > 0.0;
+    return is_medium ? direct_view(path.flight) : light_view_point(path.scattered_at);
+}
+
 // Starts the path of one sample at the camera.
 PathState path_start(uvec4 key, uvec2 pixel)
 {
@@ -257,7 +264,7 @@ void path_surface(inout PathState path, inout PathResult result, SurfacePoint s,
         }
         if (HAS_AREA_LIGHTS && s.emission_pdf > 0.0) {
             vec3 to = s.position - path.scattered_at;
-            float pdf_light = path.can_be_sampled ? light_triangle_pdf(s, wo, dot(to, to)) : 0.0;
+            float pdf_light = path.can_be_sampled ? light_triangle_pdf(s, wo, dot(to, to), path_view(path)) : 0.0;
             result.radiance += path_found_weight(path, pdf_light, s.position, false) * path.scale * path.beta * s.emission;
         }
         // Inside a solid that outranks it, a boundary is not there.
@@ -277,7 +284,7 @@ void path_surface(inout PathState path, inout PathResult result, SurfacePoint s,
     }
     // Direct light. A mirror has no density that a light's sample could meet.
     if (HAS_LIGHTS && !is_last && bsdf_has_density(bsdf)) {
-        LightSample light = light_sample(s.position, rng_uniform(path.key, path.event, SLOT_LIGHT));
+        LightSample light = light_sample(s.position, light_view_point(s.position), rng_uniform(path.key, path.event, SLOT_LIGHT));
         float side = dot(light.wi, s.ng);
         bool is_beyond = bsdf_transmits_widely(bsdf) && side < 0.0;
         if (light.pdf > 0.0 && (side > 0.0 || is_beyond)) {

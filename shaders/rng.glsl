@@ -2,10 +2,19 @@
 // slot). Dimensions are named, so that switching a feature off shifts none of
 // the others, and any sample can be computed alone.
 //
+// With HAS_STRATA the samples of an aligned block of 2^BLOCK_LEVEL are one
+// net in the four numbers of each slot, scrambled after Owen: every block has scrambles of
+// its own, so that blocks are independent and their spread gives the standard error.
+//
 // [Jarzynski20] Jarzynski, Olano, Hash Functions for GPU Rendering, JCGT 9(3): pcg4d.
+// [Owen97] Owen, Scrambled Net Variance for Integrals of Smooth Functions.
+// [Burley20] Burley, Practical Hash-based Owen Scrambling, JCGT 9(4): scrambling by hash, shuffled padding.
 
 #ifndef RNG_GLSL
 #define RNG_GLSL
+
+#include "layout.glsl"
+#include "spec.glsl"
 
 // Slots of one event of a path. Event 0 is the camera.
 const uint SLOT_CAMERA = 0u; // x, y: position in the pixel; sensors use all four
@@ -33,18 +42,70 @@ uvec4 rng_pcg4d(uvec4 v)
 
 // Key of one pixel sample. `pixel` counts in the full frame, so that crops and
 // shards see the same numbers. The first round spreads the seed and the high
-// half of the sample index over all words.
+// half of the sample index over all words. With HAS_STRATA the last word is the
+// sample's place in its block and the others are the block's.
 uvec4 rng_key(uvec2 seed, uint pixel, uint sample_low, uint sample_high)
 {
     uvec4 base = rng_pcg4d(uvec4(seed, sample_high, 0x9E3779B9u));
-    return rng_pcg4d(base ^ uvec4(pixel, sample_low, 0u, 0u));
+    if (!HAS_STRATA) {
+        return rng_pcg4d(base ^ uvec4(pixel, sample_low, 0u, 0u));
+    }
+    uvec3 block = rng_pcg4d(base ^ uvec4(pixel, sample_low >> BLOCK_LEVEL, 0u, 0u)).xyz;
+    return uvec4(block, bitfieldExtract(sample_low, 0, int(BLOCK_LEVEL)));
+}
+
+// A nested permutation of the binary digits after the point, chosen by two words for
+// each number. Adding the first word makes each result uniform by itself. [Burley20]
+uvec4 rng_owen(uvec4 digits, uvec4 add, uvec4 factor)
+{
+    uvec4 v = bitfieldReverse(digits);
+    v ^= v * 0x3D20ADEAu;
+    v += add;
+    v *= factor | 1u;
+    v ^= v * 0x05526C56u;
+    v ^= v * 0x53A22864u;
+    return bitfieldReverse(v);
+}
+
+// A permutation of the places in a block, chosen by a word: steps that carry from
+// low digits to high ones, and digits reversed between them, so that no digit leads.
+uint rng_shuffle(uint place, uint word)
+{
+    for (uint k = 0u; k < 3u; k++) {
+        place = place * (word >> 3u | 1u) + word;
+        place = bitfieldReverse(place) >> (32u - BLOCK_LEVEL);
+        word >>= 8u;
+    }
+    return place;
+}
+
+// Point of the four-dimensional net of a block. x, y, z are place / size and Sobol's first two
+// numbers: a (0, m, 3)-net, whose cells of any shape hold one point each [Owen97]. No
+// fourth number does that with all of them; of those that miss least, w is one (t = 1), found by search.
+uvec4 rng_net(uint place)
+{
+    const uvec4 columns[BLOCK_LEVEL] = uvec4[](uvec4(1u, 8u, 8u, 8u) << 28u, uvec4(2u, 4u, 12u, 2u) << 28u,
+                                               uvec4(4u, 2u, 10u, 12u) << 28u, uvec4(8u, 1u, 15u, 11u) << 28u);
+    uvec4 v = uvec4(0u);
+    for (uint k = 0u; k < BLOCK_LEVEL; k++) {
+        v ^= columns[k] * (place >> k & 1u);
+    }
+    return v;
 }
 
 // Four uniform numbers in the open interval (0, 1): multiples of 2⁻²³ plus 2⁻²⁴,
 // exact in fp32, so neither 0 nor 1 can occur.
 vec4 rng_uniform(uvec4 key, uint event, uint slot)
 {
-    uvec4 bits = rng_pcg4d(key ^ uvec4(0u, 0u, event * SLOT_COUNT + slot, 0x85EBCA6Bu));
+    uvec4 bits;
+    uint dimension = event * SLOT_COUNT + slot;
+    if (HAS_STRATA) {
+        uvec4 words = rng_pcg4d(uvec4(key.xy, key.z ^ dimension, 0x85EBCA6Bu));
+        // Slots see the block in orders of their own, so that they do not go together.
+        bits = rng_owen(rng_net(rng_shuffle(key.w, words.x ^ words.z)), words, words.yzwx);
+    } else {
+        bits = rng_pcg4d(key ^ uvec4(0u, 0u, dimension, 0x85EBCA6Bu));
+    }
     return (vec4(bits >> 9u) + 0.5) * (1.0 / 8388608.0);
 }
 

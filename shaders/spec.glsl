@@ -23,7 +23,9 @@ layout(constant_id = 15) const bool HAS_MEDIA = true;      // anything that abso
 layout(constant_id = 16) const bool HAS_SCATTERING = true; // media that scatter
 layout(constant_id = 17) const bool HAS_EQUIANGULAR = true; // distances in them are also sampled by the lights
 layout(constant_id = 18) const bool HAS_SENSOR = true;      // a light meter that is no camera
-layout(constant_id = 19) const uint STRATEGY = 0u;         // STRATEGY_*
+layout(constant_id = 19) const bool HAS_STRATA = false;     // samples of a block are a net, not independent
+layout(constant_id = 20) const bool HAS_LIGHT_TREE = false; // lights are chosen by where they are needed
+layout(constant_id = 21) const uint STRATEGY = 0u;         // STRATEGY_*
 
 // Traversals ask surface_is_opaque of triangles that are marked.
 const bool HAS_CANDIDATES = HAS_ALPHA || HAS_NESTED;

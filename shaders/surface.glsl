@@ -30,6 +30,8 @@ struct SurfacePoint {
     float alpha;       // coverage: 1 unless the material blends
     vec3 emission;     // radiance towards wo, cd/m²
     float emission_pdf;
+    uint placement;    // of the group, and the triangle in `triangles`; with HAS_LIGHT_TREE, of what emits
+    uint triangle;
     vec3 base_color;
     float metallic;
     float roughness;   // perceptual
@@ -277,6 +279,7 @@ SurfacePoint surface_white()
     s.alpha = 1.0;
     s.emission = vec3(0.0);
     s.emission_pdf = 0.0;
+    s.placement = s.triangle = 0u;
     s.base_color = vec3(1.0);
     s.metallic = 0.0;
     s.roughness = 1.0;
@@ -331,6 +334,8 @@ SurfacePoint surface_point(Hit hit, vec3 wo)
     if (HAS_AREA_LIGHTS && (material.flags & MATERIAL_EMISSIVE) != 0u && (s.is_front || (material.flags & MATERIAL_DOUBLE_SIDED) != 0u)) {
         s.emission = surface_emission(material, triangle, hit.bary);
         s.emission_pdf = material.emission_pdf;
+        s.placement = hit.instance;
+        s.triangle = hit.primitive + (HAS_INSTANCES ? instances[hit.instance].first_triangle : 0u);
     }
     if (HAS_SPECULAR) {
         vec4 factors = surface_texture(material, TEXTURE_METALLIC_ROUGHNESS, triangle, hit.bary);

@@ -4,7 +4,7 @@
 //! All numbers are little-endian. `MAGIC`; the entries of the header (count u32,
 //! then for each its name, a tag byte, and text or the bits of a double; texts
 //! are a length u32 and UTF-8); window x0, y0, x1, y1, frame width, height and
-//! whether there are sums of the first hit (u32 each); the nodes (count u32, then
+//! whether there are sums of the first hit, log₂ of the samples of a block (u32 each); the nodes (count u32, then
 //! for each its first sample u64, level u32 and floats); SHA-256 of all before.
 
 use std::fs::File;
@@ -19,7 +19,7 @@ use crate::image_io::{Metadata, Value, write_with};
 use crate::settings::{Crop, MAX_SIDE};
 
 /// Of every checkpoint; the last byte counts up when the format changes.
-const MAGIC: [u8; 16] = *b"etendue\0chkpt\0\0\x01";
+const MAGIC: [u8; 16] = *b"etendue\0chkpt\0\0\x02";
 /// Bytes of a SHA-256.
 const DIGEST: u64 = 32;
 
@@ -87,7 +87,8 @@ fn write_header(to: &mut dyn Write, header: &Metadata) -> io::Result<()> {
 fn write_film(to: &mut dyn Write, film: &Film) -> io::Result<()> {
     let Crop { x0, y0, x1, y1 } = film.window();
     let (width, height) = film.full_size();
-    for number in [x0, y0, x1, y1, width, height, film.has_aovs().into()] {
+    let aovs = film.has_aovs().into();
+    for number in [x0, y0, x1, y1, width, height, aovs, film.block_level()] {
         write_u32(to, number)?;
     }
     write_u32(to, film.nodes().count() as u32)?;
@@ -153,16 +154,17 @@ fn read_header(from: &mut Source<impl Read>) -> io::Result<Metadata> {
 }
 
 fn read_film(from: &mut Source<impl Read>) -> io::Result<Film> {
-    let mut numbers = [0; 7];
+    let mut numbers = [0; 8];
     for number in &mut numbers {
         *number = from.u32()?;
     }
-    let [x0, y0, x1, y1, width, height, aovs] = numbers;
+    let [x0, y0, x1, y1, width, height, aovs, block_level] = numbers;
     let fits = x0 < x1 && y0 < y1 && x1 <= width && y1 <= height;
-    if !fits || width.max(height) > MAX_SIDE || aovs > 1 {
+    if !fits || width.max(height) > MAX_SIDE || aovs > 1 || block_level > 63 {
         return Err(bad("impossible windows"));
     }
-    let mut film = Film::new(Crop { x0, y0, x1, y1 }, (width, height), aovs == 1);
+    let window = Crop { x0, y0, x1, y1 };
+    let mut film = Film::new(window, (width, height), aovs == 1).with_blocks(block_level);
     let count = u64::from(x1 - x0) * u64::from(y1 - y0) * film.floats_per_pixel() as u64;
     for _ in 0..from.u32()? {
         let first = u64::from_le_bytes(from.array()?);

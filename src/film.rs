@@ -41,6 +41,8 @@ pub struct Film {
     window: Crop,
     full: (u32, u32),
     aovs: bool,
+    /// log₂ of the samples that depend on each other.
+    block_level: u32,
     /// By first sample; disjoint, and no two siblings of the same level.
     nodes: BTreeMap<u64, Node>,
 }
@@ -65,6 +67,7 @@ impl Film {
             window,
             full,
             aovs,
+            block_level: 0,
             nodes: BTreeMap::new(),
         }
     }
@@ -72,7 +75,45 @@ impl Film {
     /// An empty film for what some settings render.
     pub fn of(settings: &Settings) -> Self {
         let full = (settings.width, settings.height);
-        Self::new(settings.window(), full, settings.aovs)
+        Self::new(settings.window(), full, settings.aovs).with_blocks(settings.block_level())
+    }
+
+    /// An empty film whose samples are independent only from one aligned block of
+    /// 2^`level` to the next, as those of a scrambled net: from two whole blocks on
+    /// the standard error comes from how they differ.
+    #[must_use]
+    pub fn with_blocks(mut self, level: u32) -> Self {
+        self.block_level = level;
+        self
+    }
+
+    /// log₂ of the samples that depend on each other.
+    pub fn block_level(&self) -> u32 {
+        self.block_level
+    }
+
+    /// Number of parts that the standard error takes as independent, one more than
+    /// its degrees of freedom: whole blocks and the nodes that are smaller, or
+    /// samples where there are not two whole blocks.
+    pub fn parts(&self) -> u64 {
+        let parts = |level: u32| 1_u64 << level;
+        if !self.has_blocks() {
+            return self.samples();
+        }
+        let nodes = self.nodes.values();
+        nodes
+            .map(|node| parts(node.level.saturating_sub(self.block_level)))
+            .sum()
+    }
+
+    /// Whether there are two blocks to compare.
+    fn has_blocks(&self) -> bool {
+        let nodes = self.nodes.values();
+        let whole = nodes.filter(|node| node.level >= self.block_level);
+        whole
+            .map(|node| 1_u64 << (node.level - self.block_level))
+            .sum::<u64>()
+            >= 2
     }
 
     /// The pixels that the film holds.
@@ -160,8 +201,9 @@ impl Film {
 
     /// Adds the samples first … first + 2^level − 1. `values` holds, for each pixel
     /// of the window row by row, the sum of radiance (3), the sum of squared
-    /// deviations from the node's own mean (3) and, with AOVs, the sums of albedo
-    /// (3), normal (3), depth (1) and coverage (1).
+    /// deviations from the node's own mean (3; of samples up to a single block, of
+    /// blocks beyond, each counted once for each of its samples) and, with AOVs,
+    /// the sums of albedo (3), normal (3), depth (1) and coverage (1).
     ///
     /// # Errors
     /// [`Error::Settings`] when the node is not aligned, has the wrong size, or
@@ -190,6 +232,11 @@ impl Film {
             let what = String::from("only one of the films has sums of the first hit");
             return settings_error("--aov", what);
         }
+        if self.block_level != other.block_level {
+            let what =
+                String::from("samples of one film are a net, those of the other independent");
+            return settings_error("--estimator", what);
+        }
         for (&first, node) in &other.nodes {
             self.check(first, node.level, node.values.len())?;
         }
@@ -205,10 +252,11 @@ impl Film {
         self.averages(RADIANCE)
     }
 
-    /// Estimated standard error of [`Film::mean`], cd/m² per channel, taking the
-    /// samples as independent: √(M₂ / (N (N − 1))). Where samples are stratified
-    /// the true error is smaller. With fewer than two samples nothing is known
-    /// about the error, and it is +∞.
+    /// Estimated standard error of [`Film::mean`], cd/m² per channel:
+    /// √(M₂ / (N (G − 1))) for N samples in G parts ([`Film::parts`]), where M₂ is the
+    /// sum of squared deviations of parts, each counted once for each of its samples.
+    /// Below two whole blocks their samples are taken as independent, so the error is
+    /// rather overstated. With fewer than two samples nothing is known, and it is +∞.
     pub fn standard_error(&self) -> Vec<[f32; 3]> {
         (0..self.pixels())
             .map(|pixel| self.moments(pixel).1.map(|e| e as f32))
@@ -317,7 +365,8 @@ impl Film {
             } else {
                 (values, other)
             };
-            merge_siblings(&mut values, &right, level, stride);
+            let are_blocks = level == self.block_level;
+            merge_siblings(&mut values, &right, level, stride, are_blocks);
             first = first.min(sibling);
             level += 1;
         }
@@ -349,11 +398,15 @@ impl Film {
     fn moments(&self, pixel: usize) -> ([f64; 3], [f64; 3]) {
         let start = pixel * self.floats_per_pixel();
         let (mut n, mut mean, mut m2) = (0.0, [0.0; 3], [0.0; 3]);
+        let has_blocks = self.has_blocks();
         for node in self.nodes.values() {
             let count = (1_u64 << node.level) as f64;
+            // Deviations within a block say nothing about how blocks differ.
+            let counts = !has_blocks || node.level > self.block_level;
             for channel in 0..3 {
                 let sum = f64::from(node.values[start + RADIANCE + channel]);
                 let own = f64::from(node.values[start + DEVIATIONS + channel]);
+                let own = if counts { own } else { 0.0 };
                 // [Chan83] Eq. 2.1, written with means instead of sums
                 let delta = sum / count - mean[channel];
                 m2[channel] += own + delta * delta * (n * count / (n + count));
@@ -361,11 +414,12 @@ impl Film {
             }
             n += count;
         }
+        let parts = self.parts() as f64;
         let error = m2.map(|m2| {
-            if n < 2.0 {
+            if parts < 2.0 {
                 f64::INFINITY
             } else {
-                (m2 / (n - 1.0) / n).sqrt()
+                (m2 / (parts - 1.0) / n).sqrt()
             }
         });
         (mean, error)
@@ -375,7 +429,7 @@ impl Film {
 /// Adds the right sibling to the left one, both with n = 2^level samples. The
 /// shaders do the same below the nodes that they return, in this order and
 /// without fused operations, so the bits do not depend on who merges.
-fn merge_siblings(left: &mut [f32], right: &[f32], level: u32, stride: usize) {
+fn merge_siblings(left: &mut [f32], right: &[f32], level: u32, stride: usize, are_blocks: bool) {
     // [Chan83] Eq. 2.1 for equal counts: M₂ = M₂a + M₂b + (Σa − Σb)² / (2n).
     // A power of two, hence exact.
     let scale = 0.5 / (1_u64 << level) as f32;
@@ -387,7 +441,12 @@ fn merge_siblings(left: &mut [f32], right: &[f32], level: u32, stride: usize) {
             let d = a[RADIANCE + channel] - b[RADIANCE + channel];
             let between = d * d * scale;
             let m2 = &mut a[DEVIATIONS + channel];
-            *m2 = (*m2 + b[DEVIATIONS + channel]) + between;
+            let within = if are_blocks {
+                0.0
+            } else {
+                *m2 + b[DEVIATIONS + channel]
+            };
+            *m2 = within + between;
             a[RADIANCE + channel] += b[RADIANCE + channel];
         }
         for i in ALBEDO..stride {

@@ -67,6 +67,10 @@ shared! {
         env_cos_rotation: f32,
         env_sin_rotation: f32,
         bvh_root: u32,
+        tree_choice: f32,
+        light_nodes: u32,
+        light_keys: u32,
+        light_key_count: u32,
     }
     Batch {
         first_sample_low: u32,
@@ -210,6 +214,10 @@ tags! {
     LIGHT_SPOT = 2;
     LIGHT_DIRECTIONAL = 3;
     LIGHT_TEXELS = 6;
+    LIGHT_NODE_TEXELS = 4;
+    LIGHT_LEAF = 0x80000000;
+    LIGHT_LEAF_COUNT_SHIFT = 28;
+    LIGHT_LEAF_FIRST_MASK = 0x0FFFFFFF;
     LIGHT_PLAIN = 0x80000000;
     LIGHT_DOUBLE_SIDED = 0x40000000;
     LIGHT_MIRRORED = 0x20000000;
@@ -224,6 +232,7 @@ tags! {
     LEDGER_INTERIOR_OVERFLOWS = 6;
     LEDGER_SIZE = 7;
     TILE = 8;
+    BLOCK_LEVEL = 4;
     BIND_PARAMS = 0;
     BIND_FILM = 1;
     BIND_LEDGER = 2;

@@ -6,6 +6,7 @@ use std::ops::Range;
 use glam::DVec3;
 
 use crate::error::{Error, Result};
+use crate::layout::BLOCK_LEVEL;
 
 /// Which traversal answers "what does this ray meet?".
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -171,6 +172,15 @@ impl Settings {
             x1: self.width,
             y1: self.height,
         })
+    }
+
+    /// log₂ of the samples that depend on each other: an aligned block of them is one
+    /// net; 0 when all are independent.
+    pub fn block_level(&self) -> u32 {
+        match self.estimator {
+            Estimator::Full => BLOCK_LEVEL,
+            Estimator::Textbook => 0,
+        }
     }
 
     /// Refuses what cannot be rendered, naming the option.

@@ -46,18 +46,23 @@ pub struct Spec {
     pub equiangular: bool,
     /// A light meter that is no camera.
     pub sensor: bool,
+    /// Samples of a block are a net, not independent.
+    pub strata: bool,
+    /// Lights are chosen by where they are needed.
+    pub light_tree: bool,
     /// How direct light is found.
     pub strategy: Strategy,
 }
 
 impl Spec {
     /// What the scene needs, before geometry is uploaded. `normals`, `attributes`,
-    /// `instances`, `nested`, `inside` and `equiangular` are settled by the upload,
+    /// `instances`, `nested`, `inside`, `equiangular` and `light_tree` are settled by the upload,
     /// which sees the meshes and the lights.
     pub fn for_scene(scene: &Scene, settings: &Settings) -> Self {
         let mut spec = Self {
             aovs: settings.aovs,
             sensor: settings.sensor.is_some_and(|s| s.needs_kernel()),
+            strata: settings.block_level() > 0,
             strategy: settings.strategy,
             punctual: scene.lights.iter().any(|l| l.intensity.max_element() > 0.0),
             environment: matches!(
@@ -114,6 +119,8 @@ impl Spec {
             scattering: true,
             equiangular: self.equiangular,
             sensor: self.sensor,
+            strata: self.strata,
+            light_tree: self.light_tree,
             strategy: self.strategy,
         }
     }
@@ -124,7 +131,7 @@ impl Spec {
     }
 
     /// Names of the features with their state, for people and files.
-    pub fn features(&self) -> [(&'static str, bool); 19] {
+    pub fn features(&self) -> [(&'static str, bool); 21] {
         [
             ("textures", self.textures),
             ("alpha", self.alpha),
@@ -145,6 +152,8 @@ impl Spec {
             ("scattering", self.scattering),
             ("equiangular", self.equiangular),
             ("sensor", self.sensor),
+            ("strata", self.strata),
+            ("light-tree", self.light_tree),
         ]
     }
 

@@ -16,7 +16,7 @@ const MAY_USE: &[(&str, &[&str])] = &[
     ("gpu", &["error"]),
     ("bvh", &["error"]),
     ("chart", &[]),
-    ("settings", &["error"]),
+    ("settings", &["error", "layout"]),
     ("mutant", &[]),
     ("scene", &["error", "mutant"]),
     ("film", &["error", "layout", "settings"]),

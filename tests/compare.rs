@@ -93,6 +93,7 @@ fn drawn(random: &mut Random, law: Law, side: usize, n: u64) -> Side {
         variance: Some(variance),
         source: Some(Source::StandardError),
         count: Some(vec![n as f64; side * side]),
+        block: 1.0,
         rounding: 0.0,
         notes: Vec::new(),
     }

@@ -302,3 +302,74 @@ fn pieces_are_aligned_and_make_up_the_range() {
         assert!(pieces.len() <= 2 * 62);
     }
 }
+
+/// Leaves of a film whose blocks have 2^`level` samples.
+fn blocks(samples: Range<u64>, level: u32) -> Film {
+    let mut film = film(false).with_blocks(level);
+    for sample in samples {
+        film.add(sample, 0, leaf(sample, false)).unwrap();
+    }
+    film
+}
+
+/// Squared standard error of the mean from the sums of parts: Σ n (m − mean)² / (N (G − 1)).
+fn expected_error(parts: &[Range<u64>], float: u64) -> f64 {
+    let value = |sample| f64::from(radiance(sample, float));
+    let all = || parts.iter().flat_map(Clone::clone).map(value);
+    let count = all().count() as f64;
+    let mean = all().sum::<f64>() / count;
+    let spread = |part: &Range<u64>| {
+        let n = (part.end - part.start) as f64;
+        n * (part.clone().map(value).sum::<f64>() / n - mean).powi(2)
+    };
+    let spread: f64 = parts.iter().map(spread).sum();
+    (spread / count / (parts.len() as f64 - 1.0)).sqrt()
+}
+
+#[test]
+fn blocks_decide_the_standard_error() {
+    let singles = |samples: Range<u64>| samples.map(|s| s..s + 1).collect::<Vec<_>>();
+    let cases: [(Range<u64>, Vec<Range<u64>>); 4] = [
+        // whole blocks, with a rest of two nodes
+        (0..64, (0..16).map(|b| 4 * b..4 * b + 4).collect()),
+        (0..11, vec![0..4, 4..8, 8..10, 10..11]),
+        (3..16, vec![3..4, 4..8, 8..12, 12..16]),
+        // a single block: its samples
+        (4..11, singles(4..11)),
+    ];
+    for (samples, parts) in cases {
+        let film = blocks(samples.clone(), 2);
+        assert_eq!(film.parts(), parts.len() as u64, "{samples:?}");
+        let errors = film.standard_error();
+        for (pixel, errors) in errors.iter().enumerate() {
+            for (channel, &error) in errors.iter().enumerate() {
+                let expected = expected_error(&parts, (pixel * 6 + channel) as u64);
+                let deviation = (f64::from(error) / expected - 1.0).abs();
+                // sums of up to 64 floats of very different size
+                assert!(deviation < 1e-4, "{samples:?}: {error} is not {expected}");
+            }
+        }
+    }
+    assert!(blocks(0..1, 2).relative_error().is_infinite());
+}
+
+#[test]
+fn blocks_give_the_same_bits_in_any_order() {
+    for samples in [0..100, 3..77, 64..128] {
+        let expected = bits(&blocks(samples.clone(), 3));
+        for seed in 0..20 {
+            let mut film = film(false).with_blocks(3);
+            for (first, level) in random_pieces(samples.clone(), seed) {
+                let own = blocks(first..first + (1 << level), 3);
+                let values = own.nodes().next().unwrap().2.to_vec();
+                film.add(first, level, values).unwrap();
+            }
+            assert!(bits(&film) == expected, "{samples:?}, split {seed}");
+        }
+    }
+    let mut other = blocks(0..4, 3);
+    assert!(
+        other.merge(blocks(4..8, 2)).is_err(),
+        "blocks of another size"
+    );
+}

@@ -132,6 +132,8 @@ fn features_switch_the_constant_of_their_name() {
             "scattering" => spec.scattering = true,
             "equiangular" => spec.equiangular = true,
             "sensor" => spec.sensor = true,
+            "strata" => spec.strata = true,
+            "light-tree" => spec.light_tree = true,
             _ => panic!("{name} is not a field of Spec that this test knows"),
         }
         let on: Vec<u32> = spec

@@ -123,7 +123,7 @@ pub fn throw(device: &Arc<Device>, estimator: Estimator, log2: u32, seed: u32) -
             name: "needle",
             spirv: &bytemuck::pod_collect_to_vec::<u8, u32>(KERNEL),
             bindings: &[(0, BindingKind::Storage), (1, BindingKind::Storage)],
-            constants: &[(0, estimator.kind), (1, THROWS)],
+            constants: &[(100, estimator.kind), (101, THROWS)],
             push_bytes: 12,
         },
     )?;

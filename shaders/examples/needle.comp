@@ -12,9 +12,9 @@ const uint KIND_SUM_BARE = 1u; // density f = x + y: g
 const uint KIND_SUM = 2u;      // density f = x + y: g / f
 const uint KIND_PRODUCT = 3u;  // density f = 4xy: g / f
 const uint KIND_MISTAKE = 4u;  // density 1, but weighted as if it were f = x + y: g / f
-layout(constant_id = 0) const uint KIND = KIND_UNIFORM;
+layout(constant_id = 100) const uint KIND = KIND_UNIFORM;
 // Needles of one invocation.
-layout(constant_id = 1) const uint THROWS = 1u;
+layout(constant_id = 101) const uint THROWS = 1u;
 
 layout(binding = 0, std430) writeonly buffer SumsBlock { vec2 sums[]; }; // of values, of their squares
 layout(binding = 1, std430) writeonly buffer KeptBlock { float kept[]; };

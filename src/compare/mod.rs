@@ -12,7 +12,8 @@
 //!   the noise, ν is small and the test nearly blind, as it must be.
 //! - Both images estimate the noise of one sample; the larger one counts for both, scaled by the numbers of samples. So a reference that has seen the
 //!   rare events speaks for the image that has not.
-//! - N equal samples have no variance and need not be exact: d²/N is added to each pixel's variance.
+//! - N equal samples have no variance and need not be exact: d²/N is added to each pixel's variance. Where samples are the
+//!   points of nets, N counts nets.
 //! - A pixel is judged by 2 exp(−t²/2), which bounds self-normalised sums of symmetric variables of any distribution \[Efron69\], and t² cannot
 //!   exceed N. With some dozens of samples it sees nothing but gross errors, and that is all there is to see.
 
@@ -297,10 +298,10 @@ impl<'a> Tests<'a> {
         [own, other]
     }
 
-    /// Fewest samples of a pixel.
+    /// Fewest independent parts of a pixel.
     fn fewest(&self, pixel: usize) -> f64 {
         let known = self.sides.iter().filter(|s| s.variance.is_some());
-        let counts = known.filter_map(|s| Some(s.count.as_ref()?[pixel]));
+        let counts = known.filter_map(|s| s.parts(pixel));
         let least = counts.fold(f64::INFINITY, f64::min);
         if least.is_finite() {
             least

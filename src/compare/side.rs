@@ -42,6 +42,8 @@ pub struct Side {
     pub source: Option<Source>,
     /// Samples of each pixel.
     pub count: Option<Vec<f64>>,
+    /// Samples that depend on each other, as the points of one net.
+    pub block: f64,
     /// Relative size of differences that are rounding.
     pub rounding: f64,
     /// What the user should know.
@@ -72,6 +74,7 @@ impl Side {
             notes: Vec::new(),
             mean,
             count,
+            block: (1_u64 << image.block_level()) as f64,
         };
         side.find_variance(image);
         Ok(side)
@@ -127,6 +130,13 @@ impl Side {
         }
         self.variance = Some(variance);
         self.source = Some(source);
+    }
+
+    /// Independent parts that the variance of a pixel was estimated from.
+    pub fn parts(&self, pixel: usize) -> Option<f64> {
+        let count = self.count.as_ref()?[pixel];
+        let blocks = (count / self.block).floor();
+        Some(if blocks < 2.0 { count } else { blocks })
     }
 
     /// Whether a pixel is finite in all channels.

@@ -1,7 +1,7 @@
 //! Films in images: a mean is rounded, so images that are to be merged carry the
 //! sums themselves, a layer `node.FIRST.LEVEL` for each node of the film.
 
-use super::{Channel, Image};
+use super::{Channel, Image, Value};
 use crate::film::Film;
 
 /// Before the names of the layers.
@@ -26,6 +26,9 @@ const PARTS: [&str; 14] = [
 ];
 
 impl Image {
+    /// Entry of the header: number of samples that depend on each other, a power of two.
+    pub const BLOCK: &'static str = "stderr.block";
+
     /// Adds the nodes of the film that the image was made of.
     pub fn push_nodes(&mut self, film: &Film) {
         let stride = film.floats_per_pixel();
@@ -62,7 +65,7 @@ impl Image {
         let aovs = self
             .channel(&format!("{PREFIX}{first}.{level}.{last}"))
             .is_some();
-        let mut film = Film::new(self.window, self.full, aovs);
+        let mut film = Film::new(self.window, self.full, aovs).with_blocks(self.block_level());
         for (first, level) in nodes {
             let values = self.node_values(first, level, film.floats_per_pixel())?;
             film.add(first, level, values).map_err(|e| e.to_string())?;
@@ -73,6 +76,14 @@ impl Image {
             return Err(String::from("R, G, B are not the mean of its sums"));
         }
         Ok(film)
+    }
+
+    /// log₂ of the samples that depend on each other, as the header tells; 0 where it does not.
+    pub fn block_level(&self) -> u32 {
+        match self.metadata.get(Self::BLOCK) {
+            Some(Value::Number(count)) if *count >= 1.0 => (*count as u64).ilog2(),
+            _ => 0,
+        }
     }
 
     /// The floats of a node, pixel by pixel.

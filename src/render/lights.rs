@@ -18,14 +18,8 @@ pub(crate) struct Emitter {
     pub light: layout::Light,
     /// Emitted power, up to one common factor; > 0.
     pub power: f64,
-}
-
-/// The light table with what the kernels need to know of it.
-#[derive(Default)]
-pub(crate) struct LightTable {
-    pub lights: Vec<layout::Light>,
-    /// Σ power.
-    pub total: f64,
+    /// Triangles: the placement of the group that has it.
+    pub placement: u32,
 }
 
 /// Luminance of linear Rec. 709: a scalar for deciding how to sample, never for radiance itself.
@@ -72,17 +66,18 @@ pub(crate) fn punctual(light: &PunctualLight, position: Vec3, radius: f64) -> Op
     (power > 0.0).then_some(Emitter {
         light: record,
         power,
+        placement: 0,
     })
 }
 
 /// The table over all emitters, by power or, for the yardstick, uniformly.
-pub(crate) fn table(emitters: Vec<Emitter>, is_uniform: bool) -> LightTable {
+pub(crate) fn table(emitters: Vec<Emitter>, is_uniform: bool) -> Vec<layout::Light> {
     let weights: Vec<f64> = emitters
         .iter()
         .map(|e| if is_uniform { 1.0 } else { e.power })
         .collect();
     let total = weights.iter().sum::<f64>();
-    let lights = emitters
+    emitters
         .into_iter()
         .zip(alias_table(&weights))
         .zip(&weights)
@@ -92,8 +87,7 @@ pub(crate) fn table(emitters: Vec<Emitter>, is_uniform: bool) -> LightTable {
             choice: (weight / total) as f32,
             ..emitter.light
         })
-        .collect();
-    LightTable { lights, total }
+        .collect()
 }
 
 /// Walker's alias table: entry i is kept with probability `.0`, else `.1` is taken. \[Vose91\]

@@ -4,7 +4,8 @@
 use glam::{DVec3, Vec3};
 
 use super::geometry::Geometry;
-use super::lights::{self, Emitter, LightTable};
+use super::light_tree;
+use super::lights::{self, Emitter};
 use super::media;
 use super::solids::Solids;
 use super::view::{camera_origins, params};
@@ -29,7 +30,8 @@ pub(crate) struct SceneData {
     pub media: Vec<layout::Medium>,
     pub texture_uses: Vec<layout::TextureUse>,
     pub texels: Vec<u32>,
-    pub lights: Vec<layout::Light>,
+    /// The light table as texels, then the nodes and the keys of the tree.
+    pub lights: Vec<[u32; 4]>,
     pub env_map: Vec<[f32; 4]>,
     pub env_table: Vec<layout::EnvTexel>,
 }
@@ -161,28 +163,23 @@ impl SceneData {
 
         let is_uniform = settings.estimator == Estimator::Textbook;
         let count = emitters.len();
-        let LightTable { lights, total } = lights::table(emitters, is_uniform);
-        self.lights = lights;
+        let total = if is_uniform {
+            count as f64
+        } else {
+            emitters.iter().map(|e| e.power).sum()
+        };
+        let is_distant = |e: &Emitter| e.light.kind == layout::LIGHT_DIRECTIONAL;
+        let (distant, placed): (Vec<_>, Vec<_>) = emitters.into_iter().partition(is_distant);
+        self.spec.light_tree = !is_uniform && light_tree::is_needed(&placed);
         for (record, emission) in self.materials.iter_mut().zip(emissions) {
             if *emission > 0.0 && count > 0 {
                 // Power of a unit area, as in `emissive_triangles`.
                 let power = std::f64::consts::PI * emission * sides(record.flags);
+                let total = if self.spec.light_tree { 1.0 } else { total };
                 record.emission_pdf = (power / total) as f32;
                 record.flags |= layout::MATERIAL_EMISSIVE;
             }
         }
-        for light in &mut self.lights {
-            if light.kind == layout::LIGHT_TRIANGLE {
-                let material = light.material & layout::TRIANGLE_MATERIAL_MASK;
-                light.emission_pdf = self.materials[material as usize].emission_pdf;
-            }
-        }
-        self.params.light_count = count as u32;
-        self.params.light_uniform = if is_uniform && count > 0 {
-            1.0 / count as f32
-        } else {
-            0.0
-        };
         let env_choice = match (self.spec.environment, count) {
             (false, _) => 0.0,
             (true, 0) => 1.0,
@@ -191,6 +188,49 @@ impl SceneData {
         };
         self.params.env_choice = env_choice as f32;
         self.params.table_choice = 1.0 - self.params.env_choice;
+        if self.spec.light_tree {
+            let share = distant.iter().map(|e| e.power).sum::<f64>() / total;
+            self.params.tree_choice = self.params.table_choice * (1.0 - share) as f32;
+            self.params.table_choice *= share as f32;
+            self.add_table(distant, is_uniform);
+            self.add_tree(placed);
+        } else {
+            let emitters = placed.into_iter().chain(distant).collect();
+            self.add_table(emitters, is_uniform);
+        }
+    }
+
+    /// Lights that are chosen wherever they are needed with the same probability.
+    fn add_table(&mut self, mut emitters: Vec<Emitter>, is_uniform: bool) {
+        self.params.light_count = emitters.len() as u32;
+        if is_uniform && !emitters.is_empty() {
+            self.params.light_uniform = 1.0 / emitters.len() as f32;
+        }
+        self.put_densities(&mut emitters);
+        let lights = lights::table(emitters, is_uniform);
+        self.lights = bytemuck::cast_slice(&lights).to_vec();
+    }
+
+    /// Lights that are chosen by where they are needed.
+    fn add_tree(&mut self, mut emitters: Vec<Emitter>) {
+        self.put_densities(&mut emitters);
+        let tree = light_tree::build(&emitters, self.params.light_count as usize);
+        self.lights.extend(bytemuck::cast_slice(&tree.lights));
+        self.params.light_nodes = self.lights.len() as u32;
+        self.lights.extend(tree.nodes);
+        self.params.light_keys = self.lights.len() as u32;
+        self.params.light_key_count = tree.keys.len() as u32;
+        self.lights.extend(tree.keys);
+    }
+
+    /// Gives emissive triangles the density of their material.
+    fn put_densities(&self, emitters: &mut [Emitter]) {
+        for Emitter { light, .. } in emitters {
+            if light.kind == layout::LIGHT_TRIANGLE {
+                let material = light.material & layout::TRIANGLE_MATERIAL_MASK;
+                light.emission_pdf = self.materials[material as usize].emission_pdf;
+            }
+        }
     }
 
     /// Every placed triangle that emits, with its power: π · radiance · area · sides.
@@ -201,7 +241,7 @@ impl SceneData {
         emissions: &[f64],
     ) -> Vec<Emitter> {
         let mut emitters = Vec::new();
-        for placement in &self.geometry.placements {
+        for (index, placement) in (0..).zip(&self.geometry.placements) {
             for triangle in self.geometry.groups[placement.group].triangles.clone() {
                 let material =
                     self.geometry.triangles[triangle][3] & layout::TRIANGLE_MATERIAL_MASK;
@@ -229,7 +269,11 @@ impl SceneData {
                         intensity: record.emission,
                         ..Default::default()
                     };
-                    emitters.push(Emitter { light, power });
+                    emitters.push(Emitter {
+                        light,
+                        power,
+                        placement: index,
+                    });
                 }
             }
         }

@@ -17,19 +17,7 @@ pub struct Rendered {
 /// validation had nothing to say. Without a device that can do it: `None` and
 /// a printed reason, or a failure where `ETENDUE_REQUIRE_DEVICE` is 1.
 pub fn render(scene: &Scene, settings: &Settings, tuning: Tuning) -> Option<Rendered> {
-    let options = DeviceOptions {
-        device: None,
-        validation: true,
-    };
-    let required = std::env::var_os("ETENDUE_REQUIRE_DEVICE").is_some_and(|value| value == "1");
-    let mut renderer = match Renderer::tuned(scene, settings, &options, tuning) {
-        Ok(renderer) => renderer,
-        Err(error @ Error::Unsupported { .. }) if !required => {
-            println!("skipped: {error}");
-            return None;
-        }
-        Err(error) => panic!("{error}"),
-    };
+    let mut renderer = open(scene, settings, tuning)?;
     let film = renderer.render(&mut |_| Control::Continue).unwrap();
     let report = renderer.report();
     assert_eq!(
@@ -39,6 +27,23 @@ pub fn render(scene: &Scene, settings: &Settings, tuning: Tuning) -> Option<Rend
     assert_eq!(report.ledger.non_finite, 0, "samples were dropped");
     assert_eq!(renderer.validation_messages(), Vec::<String>::new());
     Some(Rendered { film, report })
+}
+
+/// A renderer under validation, or the printed reason why there is none.
+pub fn open(scene: &Scene, settings: &Settings, tuning: Tuning) -> Option<Renderer> {
+    let options = DeviceOptions {
+        device: None,
+        validation: true,
+    };
+    let required = std::env::var_os("ETENDUE_REQUIRE_DEVICE").is_some_and(|value| value == "1");
+    match Renderer::tuned(scene, settings, &options, tuning) {
+        Ok(renderer) => Some(renderer),
+        Err(error @ Error::Unsupported { .. }) if !required => {
+            println!("skipped: {error}");
+            None
+        }
+        Err(error) => panic!("{error}"),
+    }
 }
 
 /// A square frame of `side` pixels and `samples` samples with our own tree.

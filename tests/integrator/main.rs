@@ -17,11 +17,13 @@
 mod common;
 
 mod analytic;
+mod calibration;
 mod closed;
 mod determinism;
 mod emission;
 mod features;
 mod furnace;
+mod lamps;
 mod normals;
 mod punctual;
 mod sky;

@@ -21,15 +21,15 @@ const VARIANTS: [(Strategy, Estimator); 4] = [
 ];
 
 /// Effort and demand of one scene.
-struct Plan {
+pub struct Plan {
     /// Samples a pixel of each variant: they even out the errors.
-    samples: [u64; 4],
+    pub samples: [u64; 4],
     /// Relative difference of two means that is allowed, chance included.
-    delta: f64,
+    pub delta: f64,
 }
 
 /// Means of all variants, each with a seed of its own, agree with the first.
-fn agree(name: &str, scene: &Scene, plan: &Plan) {
+pub fn agree(name: &str, scene: &Scene, plan: &Plan, tuning: Tuning) {
     let mut first = None;
     for (i, (strategy, estimator)) in VARIANTS.into_iter().enumerate() {
         let settings = Settings {
@@ -38,7 +38,7 @@ fn agree(name: &str, scene: &Scene, plan: &Plan) {
             seed: 21 + i as u64,
             ..settings(16, plan.samples[i])
         };
-        let Some(r) = render(scene, &settings, Tuning::default()) else {
+        let Some(r) = render(scene, &settings, tuning) else {
             return;
         };
         let (mean, error) = image_mean(&r.film);
@@ -80,7 +80,7 @@ fn lambert_room_with_a_quad_light() {
         samples: [4096, 4096, 4096, 16_384],
         delta: 1e-2,
     };
-    agree("room", &scene, &plan);
+    agree("room", &scene, &plan, Tuning::default());
 }
 
 #[test]
@@ -101,7 +101,7 @@ fn rough_metal_with_a_spherical_emitter() {
         samples: [8192, 8192, 32_768, 8192],
         delta: 1.5e-2,
     };
-    agree("metal", &scene, &plan);
+    agree("metal", &scene, &plan, Tuning::default());
 }
 
 #[test]
@@ -123,7 +123,7 @@ fn sun_in_a_map_behind_an_occluder() {
         samples: [16_384, 16_384, 32_768, 16_384],
         delta: 5e-3,
     };
-    agree("sun", &scene, &plan);
+    agree("sun", &scene, &plan, Tuning::default());
 }
 
 #[test]
@@ -177,5 +177,5 @@ fn pane_and_cut_out_under_a_quad_light() {
         samples: [16_384; 4],
         delta: 5e-3,
     };
-    agree("pane", &scene, &plan);
+    agree("pane", &scene, &plan, Tuning::default());
 }

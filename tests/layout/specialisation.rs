@@ -62,6 +62,8 @@ fn everything() -> Spec {
         equiangular: true,
         sensor: true,
         aovs: true,
+        strata: true,
+        light_tree: true,
         ..Spec::default().with_everything()
     }
 }

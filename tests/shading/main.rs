@@ -22,6 +22,7 @@ mod interface_samplers;
 mod lights;
 mod lookups;
 mod media;
+mod nets;
 mod oracle;
 mod phase;
 mod random;

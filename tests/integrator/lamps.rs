@@ -1,0 +1,131 @@
+//! Scenes with so many lamps that they are chosen by a tree.
+
+use etendue::render::Tuning;
+use etendue::scene::{Instance, LightKind, Medium, PunctualLight, Scene};
+use etendue::settings::{Estimator, Settings};
+use glam::{DAffine3, DVec3, Vec3};
+
+use crate::common::*;
+use crate::strategies::{Plan, agree};
+use crate::{Z, image_mean};
+
+/// Lamps of many shapes over a floor: spheres that share a mesh, one of them mirrored
+/// and stretched, a sheet that shines to both sides, and one that faces away.
+fn lamps() -> Scene {
+    let mut scene = empty();
+    add(&mut scene, square(Vec3::ZERO, Vec3::Y, 3.0), lambert(0.6));
+    let place = |scale: DVec3, at: DVec3| DAffine3 {
+        translation: at,
+        ..DAffine3::from_scale(scale)
+    };
+    let (small, far) = (DVec3::splat(0.12), DVec3::new(-0.4, 0.3, 0.4));
+    let bulb = place(small, DVec3::new(-1.2, 0.4, -0.3));
+    add_at(&mut scene, faceted(sphere(1)), emitter(0.0, 6.0), bulb);
+    let mesh = scene.instances[1].mesh;
+    for (scale, at) in [
+        (DVec3::splat(0.4), DVec3::new(1.6, 1.8, -1.0)),
+        (far, DVec3::new(0.3, 1.2, 1.0)),
+    ] {
+        scene.instances.push(Instance {
+            name: String::from("bulb"),
+            mesh,
+            world_from_object: place(scale, at),
+        });
+    }
+    let mut sheet = emitter(0.0, 1.5);
+    sheet.double_sided = true;
+    add(
+        &mut scene,
+        square(Vec3::new(0.9, 0.5, 0.3), Vec3::X, 0.3),
+        sheet,
+    );
+    add(
+        &mut scene,
+        square(Vec3::new(-0.5, 1.5, 0.5), Vec3::Y, 0.4),
+        emitter(0.3, 5.0),
+    );
+    scene.cameras = vec![pinhole(DVec3::new(0.0, 2.6, 3.4), DVec3::ZERO, 40.0)];
+    scene
+}
+
+#[test]
+fn lamps_of_many_shapes() {
+    let plan = Plan {
+        samples: [2048, 8192, 4096, 32_768],
+        delta: 1e-2,
+    };
+    for copy_limit in [0, usize::MAX] {
+        let tuning = Tuning {
+            copy_limit,
+            ..Tuning::default()
+        };
+        agree("lamps", &lamps(), &plan, tuning);
+    }
+}
+
+/// As above within a medium that scatters, where lights are chosen for segments.
+#[test]
+fn lamps_in_fog() {
+    let mut scene = lamps();
+    scene.medium = Some(Medium {
+        absorption: Vec3::new(0.02, 0.05, 0.1),
+        scattering: Vec3::new(0.2, 0.15, 0.1),
+        ..Medium::default()
+    });
+    let plan = Plan {
+        samples: [4096, 8192, 16_384, 65_536],
+        delta: 2e-2,
+    };
+    agree("lamps in fog", &scene, &plan, Tuning::default());
+}
+
+/// Irradiance of points of light, a spot and the sun on a white floor, in closed form.
+#[test]
+fn points_of_light_add_up() {
+    let mut scene = empty();
+    add(&mut scene, square(Vec3::ZERO, Vec3::Y, 3.0), lambert(1.0));
+    scene.cameras = vec![parallel(DVec3::Y, DVec3::ZERO, 1e-4)];
+    let (mut expected, down) = (0.0, -Vec3::Y);
+    for i in 0..40 {
+        let angle = f64::from(i) * 2.4;
+        let height = 0.2 + 0.05 * f64::from(i);
+        let position = DVec3::new(angle.cos(), height, 2.0 * angle.sin());
+        let candela = 1.0 + 0.3 * f64::from(i % 7);
+        // E = I cosθ / d²
+        let distance2 = position.length_squared();
+        expected += candela * height / distance2.sqrt() / distance2;
+        scene.lights.push(PunctualLight {
+            name: String::from("point"),
+            kind: LightKind::Point,
+            position,
+            direction: down,
+            intensity: Vec3::splat(candela as f32),
+        });
+    }
+    expected += 3.0;
+    scene.lights.push(PunctualLight {
+        name: String::from("sun"),
+        kind: LightKind::Directional,
+        position: DVec3::ZERO,
+        direction: down,
+        intensity: Vec3::splat(3.0),
+    });
+    // What a floor of reflectance 1 sends on.
+    let truth = expected / std::f64::consts::PI;
+    for (estimator, samples) in [(Estimator::Full, 16_384), (Estimator::Textbook, 65_536)] {
+        let settings = Settings {
+            estimator,
+            ..settings(8, samples)
+        };
+        let Some(r) = render(&scene, &settings, Tuning::default()) else {
+            return;
+        };
+        let (mean, error) = image_mean(&r.film);
+        let off = (mean - truth).abs() + Z * error;
+        println!(
+            "{}: {mean:.6} ± {error:.6}, truth {truth:.6}",
+            estimator.name()
+        );
+        assert!(off <= 5e-3 * truth, "{mean} ± {error}, not {truth}");
+    }
+}
