@@ -64,10 +64,13 @@ step "the program builds ($(cargo --version))" cargo build --release --locked
 step "the device that the tests use" "$CARGO_TARGET_DIR/release/etendue" info
 step "the shaders are valid SPIR-V for Vulkan 1.2 (spirv-val)" validate_shaders
 if cargo clippy --version >/dev/null 2>&1; then
-    step "no warnings (clippy)" cargo clippy --release --all-targets --locked -- -D warnings
+    step "no warnings (clippy)" cargo clippy --release --all-targets --locked --features faults -- -D warnings
 else
     skip "lints: clippy is not installed (Debian package rust-clippy)"
 fi
+# Before the others, which then find the program without the feature.
+step "calls and files that fail do no harm" \
+    cargo test --release --locked --features faults --test faults
 step "every test passes, on a device (cargo test)" run_tests "$@"
 step "the documentation builds without warnings" document
 

@@ -6,6 +6,8 @@ pub mod chart;
 pub mod checkpoint;
 pub mod compare;
 pub mod error;
+#[doc(hidden)]
+pub mod fault;
 pub mod film;
 pub mod gpu;
 pub mod image_io;

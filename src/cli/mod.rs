@@ -32,6 +32,8 @@ use self::failure::{Failure, Outcome};
 /// The whole program.
 pub fn main() -> ExitCode {
     failure::report_panics_as_errors();
+    #[cfg(feature = "faults")]
+    etendue::fault::arm_from_environment();
     let outcome = match Arguments::parse().command {
         Command::Render(args) => {
             // lines of text would get between the JSON objects

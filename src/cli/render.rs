@@ -50,7 +50,8 @@ pub fn repeat(args: &RenderArgs, repeats: Option<&Repeat>) -> Result<Outcome, Fa
     let (film, work) = begin(&job, saved, &renderer.report(), &reporter)?;
 
     interrupt.begin_rendering();
-    let (film, stop) = render(&mut renderer, &job, film, work, &interrupt, &mut reporter)?;
+    let rendered = render(&mut renderer, &job, film, work, &interrupt, &mut reporter);
+    let (film, stop) = rendered.map_err(|error| rescue(error, &mut renderer, &job, &reporter))?;
     interrupt.begin_writing();
     reporter.clear();
     let report = renderer.report();
@@ -258,6 +259,34 @@ fn render(
         stop = Stop::Samples;
     }
     Ok((film, stop))
+}
+
+/// Keeps what was finished before a render failed, if there is a checkpoint to keep it in.
+fn rescue(error: Error, renderer: &mut Renderer, job: &Job, reporter: &Reporter) -> Error {
+    let Some(path) = &job.args.checkpoint else {
+        return error;
+    };
+    let finished = renderer.take_finished();
+    let Some((film, work)) = finished.filter(|(film, _)| film.samples() > 0) else {
+        return error;
+    };
+    let mut report = renderer.report();
+    report.times.render = work.seconds;
+    let record = Record {
+        job,
+        report: &report,
+        film: &film,
+        stop: Stop::Interrupt,
+    };
+    match checkpoint::save(path, &record) {
+        Ok(()) => reporter.warn(&format!(
+            "the render failed; its {} finished samples are in {}, --resume goes on from there",
+            film.samples(),
+            path.display()
+        )),
+        Err(failed) => reporter.warn(&failed.to_string()),
+    }
+    error
 }
 
 /// Which limit of the arguments has been reached, if any.

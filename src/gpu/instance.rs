@@ -61,6 +61,8 @@ impl Instance {
             what: String::from("Vulkan"),
             missing: format!("no loader was found ({error}); {PACKAGES}"),
         })?;
+        #[cfg(feature = "faults")]
+        let entry = super::shim::interpose(entry);
         let version = loader_version(&entry)?;
         let debug_utils = has_extension(
             // SAFETY: a global command without preconditions.
@@ -73,6 +75,8 @@ impl Instance {
         }
 
         let log = Arc::new(ValidationLog::default());
+        #[cfg(feature = "faults")]
+        super::shim::watch(&log);
         let application = vk::ApplicationInfo::default()
             .application_name(c"etendue")
             .engine_name(c"etendue")

@@ -31,6 +31,9 @@ pub mod faults;
 mod instance;
 mod pipeline;
 mod rays;
+#[cfg(feature = "faults")]
+#[doc(hidden)]
+pub mod shim;
 
 pub use accel::{Blas, BlasGeometry, Tlas, TlasInstance};
 pub use buffer::{Buffer, Memory, TexelFormat, Usage};

@@ -8,6 +8,11 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use crate::error::{Error, Result};
+use crate::fault::file_step;
+
+/// Characters of a file's name that its temporary file's has as well. With what is added
+/// and four bytes each they stay below 255 bytes, which is what file systems take.
+const NAME_CHARACTERS: usize = 48;
 
 /// Writes a file atomically. An existing file keeps its permissions, a symbolic
 /// link keeps pointing to where it points, and devices and pipes are written to.
@@ -30,17 +35,19 @@ pub fn write_with(
         return OpenOptions::new()
             .write(true)
             .open(path)
-            .and_then(|mut file| content(&mut file))
+            .and_then(|file| content(&mut Steps(file)))
             .map_err(|source| io_error("write", path, source));
     }
     let target = resolve(path);
     let mut temporary = Temporary::create(&target)?;
     let written = (|| {
         if let Ok(old) = fs::metadata(&target) {
-            temporary.file.set_permissions(old.permissions())?;
+            file_step("permissions")?;
+            temporary.file.0.set_permissions(old.permissions())?;
         }
         content(&mut temporary.file)?;
-        temporary.file.sync_all()
+        file_step("flush")?;
+        temporary.file.0.sync_all()
     })();
     written.map_err(|source| io_error("write", path, source))?;
     temporary.publish(&target)
@@ -84,10 +91,24 @@ fn folder(path: &Path) -> &Path {
     }
 }
 
+/// A file each of whose writes is a step.
+struct Steps(File);
+
+impl Write for Steps {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        file_step("write")?;
+        self.0.write(bytes)
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        self.0.flush()
+    }
+}
+
 /// A file that removes itself unless it is published.
 struct Temporary {
     path: PathBuf,
-    file: File,
+    file: Steps,
     published: bool,
 }
 
@@ -99,26 +120,30 @@ impl Temporary {
         let Some(name) = target.file_name() else {
             return Err(fail(io::ErrorKind::InvalidInput.into()));
         };
-        if let Ok(old) = fs::metadata(target) {
-            if old.is_dir() {
-                return Err(fail(io::ErrorKind::IsADirectory.into()));
-            }
+        match fs::metadata(target) {
+            Ok(old) if old.is_dir() => return Err(fail(io::ErrorKind::IsADirectory.into())),
             // renaming over it would succeed, but its owner asked to keep it
-            if old.permissions().readonly() {
+            Ok(old) if old.permissions().readonly() => {
                 return Err(fail(io::ErrorKind::PermissionDenied.into()));
             }
+            Ok(_) => {}
+            Err(error) if error.kind() == io::ErrorKind::NotFound => {}
+            // a name that is too long, among others: the temporary file's is not
+            Err(error) => return Err(fail(error)),
         }
         loop {
             let mut unique = OsString::from(".");
-            unique.push(name);
+            let name = name.to_string_lossy();
+            unique.push(name.chars().take(NAME_CHARACTERS).collect::<String>());
             let number = COUNTER.fetch_add(1, Ordering::Relaxed);
             unique.push(format!(".{}-{number}.tmp", std::process::id()));
             let path = folder(target).join(unique);
-            match OpenOptions::new().write(true).create_new(true).open(&path) {
+            let create = || OpenOptions::new().write(true).create_new(true).open(&path);
+            match file_step("create").and_then(|()| create()) {
                 Ok(file) => {
                     return Ok(Self {
                         path,
-                        file,
+                        file: Steps(file),
                         published: false,
                     });
                 }
@@ -131,7 +156,8 @@ impl Temporary {
 
     /// Gives the file its name, and makes the name last.
     fn publish(mut self, target: &Path) -> Result<()> {
-        fs::rename(&self.path, target).map_err(|source| io_error("rename to", target, source))?;
+        let renamed = file_step("rename").and_then(|()| fs::rename(&self.path, target));
+        renamed.map_err(|source| io_error("rename to", target, source))?;
         self.published = true;
         sync_folder(folder(target)).map_err(|source| io_error("flush", target, source))
     }
@@ -149,6 +175,7 @@ impl Drop for Temporary {
 /// A rename lasts through a power failure only once its folder is on the disk.
 #[cfg(unix)]
 fn sync_folder(folder: &Path) -> io::Result<()> {
+    file_step("flush folder")?;
     match File::open(folder)?.sync_all() {
         // file systems that cannot flush folders say so
         Err(error) if error.kind() == io::ErrorKind::InvalidInput => Ok(()),

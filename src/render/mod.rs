@@ -85,6 +85,8 @@ pub struct Renderer {
     tiles_per_batch: u32,
     pace: Pace,
     report: Report,
+    /// The complete passes of a render that failed.
+    finished: Option<(Film, Work)>,
 }
 
 impl Renderer {
@@ -150,6 +152,7 @@ impl Renderer {
             tiles_per_batch: FIRST_BATCH_TILES.min(tuning.max_tiles),
             pace: Pace::default(),
             report,
+            finished: None,
         })
     }
 
@@ -183,7 +186,8 @@ impl Renderer {
     /// has the same bits as if it had been rendered at once.
     ///
     /// # Errors
-    /// The device fails, or the film is not one of these settings.
+    /// The device fails, or the film is not one of these settings. [`Self::take_finished`]
+    /// has what was complete by then.
     pub fn resume(
         &mut self,
         mut film: Film,
@@ -193,11 +197,40 @@ impl Renderer {
     ) -> Result<Film> {
         // refuses a film of other settings, and says what differs
         film.merge(Film::of(&self.settings))?;
+        let mut work = before;
+        let start = Instant::now();
+        let result = self.passes(&mut film, &mut work, samples, start, control);
+        self.report.times.render = before.seconds + start.elapsed().as_secs_f64();
+        self.report.paths = film.samples() * film.pixels() as u64;
+        (self.report.rays, self.report.ledger) = (work.rays, work.ledger);
+        self.report.memory.film = self.backend.memory().film + film.bytes();
+        match result {
+            Ok(()) => Ok(film),
+            Err(error) => {
+                self.finished = Some((film, work));
+                Err(error)
+            }
+        }
+    }
+
+    /// The complete passes of the last render, if it failed, and what they took.
+    pub fn take_finished(&mut self) -> Option<(Film, Work)> {
+        self.finished.take()
+    }
+
+    /// Renders what the film lacks, pass by pass.
+    fn passes(
+        &mut self,
+        film: &mut Film,
+        work: &mut Work,
+        samples: &[Range<u64>],
+        start: Instant,
+        control: &mut dyn FnMut(&Progress) -> Control,
+    ) -> Result<()> {
+        let before = work.seconds;
         let missing = film.missing(samples);
         let samples_before = film.samples();
         let total = samples_before + missing.iter().map(|r| r.end - r.start).sum::<u64>();
-        let mut work = before;
-        let start = Instant::now();
         let mut passes = Passes::new(missing, self.tuning.max_pass);
         while let Some((first, level)) = passes.upcoming() {
             let pass_start = Instant::now();
@@ -216,25 +249,22 @@ impl Renderer {
                 })
             };
             self.backend.reset_ledger()?;
-            let mut between = |share: f64| tell(share, false, &film, &work);
+            let mut between = |share: f64| tell(share, false, film, work);
             let Some(values) = self.pass(first, level, &mut between)? else {
                 break;
             };
-            film.add(first, level, values)?;
+            // first, so that a film never has samples whose ledger is missing
             let (rays, ledger) = self.backend.ledger()?;
+            film.add(first, level, values)?;
             work.rays += rays;
             work.ledger.add(&ledger);
-            work.seconds = before.seconds + start.elapsed().as_secs_f64();
+            work.seconds = before + start.elapsed().as_secs_f64();
             passes.finish(pass_start.elapsed().as_secs_f64(), PASS_SECONDS);
-            if tell(1.0, true, &film, &work) == Control::Stop {
+            if tell(1.0, true, film, work) == Control::Stop {
                 break;
             }
         }
-        self.report.times.render = before.seconds + start.elapsed().as_secs_f64();
-        self.report.paths = film.samples() * film.pixels() as u64;
-        (self.report.rays, self.report.ledger) = (work.rays, work.ledger);
-        self.report.memory.film = self.backend.memory().film + film.bytes();
-        Ok(film)
+        Ok(())
     }
 
     /// Renders one node of the film's tree in batches; `between` hears the share
