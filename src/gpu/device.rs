@@ -134,6 +134,13 @@ impl Device {
         &self.caps
     }
 
+    /// Bytes of this device's memory that buffers have, and bytes that were taken from the
+    /// driver for them.
+    pub fn memory(&self) -> (u64, u64) {
+        let report = self.allocator().generate_report();
+        (report.total_allocated_bytes, report.total_capacity_bytes)
+    }
+
     /// Every error and warning of the validation layer so far; empty without validation.
     pub fn validation_messages(&self) -> Vec<String> {
         self.root.instance.log.messages()

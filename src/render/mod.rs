@@ -324,6 +324,12 @@ impl Renderer {
         self.backend.probe(rays)
     }
 
+    /// Bytes of device memory that buffers have, and that were taken from the driver.
+    #[doc(hidden)]
+    pub fn device_memory(&self) -> (u64, u64) {
+        self.backend.device_memory()
+    }
+
     /// What the validation layer said so far.
     #[doc(hidden)]
     pub fn validation_messages(&self) -> Vec<String> {

@@ -252,6 +252,10 @@ impl VulkanBackend {
         self.memory
     }
 
+    pub fn device_memory(&self) -> (u64, u64) {
+        self.device.memory()
+    }
+
     pub fn validation_messages(&self) -> Vec<String> {
         self.device.validation_messages()
     }

@@ -1,6 +1,6 @@
 //! What becomes of a render when a call of Vulkan or a step of writing a file fails, for
 //! each of them: an error that says so, nothing leaked, nothing lost that was finished.
-//! Takes the feature `faults`. `ETENDUE_NIGHTLY` tries every call, not only some.
+//! Takes the feature `faults`. `ETENDUE_NIGHTLY=1` tries every call, not only some.
 #![allow(
     clippy::unwrap_used,
     clippy::print_stderr,
@@ -16,5 +16,5 @@ mod vulkan;
 
 /// Whether everything is tried.
 fn is_nightly() -> bool {
-    std::env::var_os("ETENDUE_NIGHTLY").is_some()
+    std::env::var_os("ETENDUE_NIGHTLY").is_some_and(|value| value == "1")
 }

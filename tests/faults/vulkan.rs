@@ -124,7 +124,7 @@ fn every_call_fails_cleanly(backend: BackendChoice) {
     }
     assert_eq!(whole.messages, Vec::<String>::new());
     let is_compilation = |call: &&str| call.contains("Pipelines");
-    let compiled = whole.calls.iter().position(|call| is_compilation(call));
+    let compiled = whole.calls.iter().position(is_compilation);
     let compiled = compiled.expect("every render compiles") as u64 + 1;
     let manners = [Manner::Once, Manner::Lasting, Manner::Lost];
     let mut longest = Duration::ZERO;

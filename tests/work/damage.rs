@@ -68,7 +68,7 @@ fn every_cut_and_any_flipped_bit_is_noticed() {
     }
     fs::write(&path, [&bytes[..], &[0]].concat()).unwrap();
     refused(&path, "a byte more");
-    for round in 0..rounds(1500) {
+    for round in 0..rounds(1500, 15_000) {
         let mut damaged = bytes.clone();
         for flip in 0..1 + round % 4 {
             let bit = hash(round * 8 + flip) as usize % (bytes.len() * 8);
@@ -89,7 +89,7 @@ fn claims_are_not_believed() {
     let folder = tempfile::tempdir().unwrap();
     let (path, bytes) = good(folder.path());
     let body = bytes.len() - 32;
-    for round in 0..rounds(3000) {
+    for round in 0..rounds(3000, 30_000) {
         let mut bytes = bytes[..body].to_vec();
         // the largest numbers in the places of lengths and counts, among others
         let at = 16 + hash(round) as usize % (body - 20);

@@ -1,10 +1,11 @@
 //! Nothing finished is lost, and any split of the work gives the same picture:
-//! checkpoints, shards, and renders that are repeated. `ETENDUE_NIGHTLY` repeats
-//! the random parts that many times.
+//! checkpoints, shards, and renders that are repeated. With `ETENDUE_NIGHTLY=1`
+//! the random parts run more often.
 #![allow(clippy::unwrap_used, reason = "a step that fails fails the test")]
 #![allow(clippy::print_stderr, reason = "a test that is skipped says so")]
 
 mod damage;
+mod growth;
 mod refusals;
 mod rerender;
 mod resume;
@@ -18,10 +19,10 @@ use etendue::render::{DeviceOptions, Renderer, Tuning};
 use etendue::scene::gltf;
 use etendue::settings::Settings;
 
-/// How often the random parts run; more at night.
-fn rounds(gate: u64) -> u64 {
-    let nightly = std::env::var("ETENDUE_NIGHTLY").ok();
-    gate * nightly.and_then(|n| n.parse().ok()).unwrap_or(1)
+/// How often the random parts run: by day, or at night.
+fn rounds(day: u64, night: u64) -> u64 {
+    let is_night = std::env::var_os("ETENDUE_NIGHTLY").is_some_and(|value| value == "1");
+    if is_night { night } else { day }
 }
 
 /// splitmix64: enough for test data, and the same on every machine.

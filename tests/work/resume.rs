@@ -3,7 +3,7 @@
 use std::fs;
 use std::process::Stdio;
 use std::slice;
-use std::time::Duration;
+use std::time::Instant;
 
 use etendue::checkpoint;
 use etendue::film::Film;
@@ -15,7 +15,8 @@ use super::support::{
 };
 use super::{bits, example, hash, renderer, rounds};
 
-/// Stops after a random batch, saves, reads and goes on, until all is there.
+/// Stops after a random batch, saves, reads and goes on, until all is there; as often
+/// as it takes for so many stops.
 #[test]
 fn any_stop_point_gives_the_same_bits() {
     if !has_device() {
@@ -32,12 +33,12 @@ fn any_stop_point_gives_the_same_bits() {
             Control::Continue
         });
         let (whole, report) = (whole.unwrap(), renderer.report());
-        let mut stops = 0;
-        for round in 0..rounds(12) {
+        let (mut stops, mut draw) = (0, 0);
+        while stops < rounds(40, 200) {
             let (mut film, mut work) = (Film::of(&settings), Work::default());
             while film.samples() < 100 {
-                stops += 1;
-                let mut left = hash(round * 1000 + stops) % batches;
+                draw += 1;
+                let mut left = hash(draw) % batches;
                 let samples = [settings.samples.clone()];
                 let result = renderer.resume(film, work, &samples, &mut |progress| {
                     work = progress.work;
@@ -49,12 +50,14 @@ fn any_stop_point_gives_the_same_bits() {
                 });
                 checkpoint::write(&path, &Metadata::new(), &result.unwrap()).unwrap();
                 film = checkpoint::read(&path).unwrap().1;
+                // the last one is no stop
+                stops += u64::from(film.samples() < 100);
             }
-            assert!(bits(&film) == bits(&whole), "round {round} of {scene}");
+            assert!(bits(&film) == bits(&whole), "stop {stops} of {scene}");
             assert_eq!(work.rays, report.rays);
             assert_eq!(work.ledger.truncated_paths, report.ledger.truncated_paths);
         }
-        assert!(stops > rounds(12), "nothing was ever stopped");
+        eprintln!("{scene}: {stops} stops");
     }
 }
 
@@ -152,22 +155,26 @@ fn killed_renders_leave_complete_files() {
     }
     let folder = scene();
     let all = "--width 64 --spp 2000";
+    let start = Instant::now();
     render(&folder, &format!("-o whole.exr {all}"));
+    let whole = start.elapsed();
     let line = format!(
         "render scene.gltf -o a.exr -o a.png --stats s.json {all} -q \
          --checkpoint c.ck --resume --checkpoint-interval 0"
     );
     let path = |name: &str| folder.path().join(name);
-    let mut held = 0;
-    for round in 0..rounds(6) {
+    let (mut held, mut finished, mut met) = (0, 0, 0);
+    for round in 0..rounds(60, 1000) {
         let mut child = command(&line, folder.path()).spawn().unwrap();
-        std::thread::sleep(Duration::from_millis(300 + hash(round) % 1200));
+        // most of the time before the first sample is left out
+        std::thread::sleep(whole.mul_f64(0.4 + 0.7 * (hash(round) % 1000) as f64 / 1000.0));
         // SIGKILL; a render that is done already does not mind
         child.kill().unwrap();
         child.wait().unwrap();
         if path("c.ck").exists() {
             let (_, film) = checkpoint::read(&path("c.ck")).unwrap();
             assert!(film.samples() >= held, "round {round}");
+            met += u64::from(film.samples() > held);
             held = film.samples();
         }
         if path("a.exr").exists() {
@@ -184,8 +191,14 @@ fn killed_renders_leave_complete_files() {
             // start anew
             fs::remove_file(path("c.ck")).unwrap();
             held = 0;
+            finished += 1;
         }
     }
+    eprintln!("{met} went on, {finished} came to the end");
+    assert!(
+        met > 0,
+        "every render was killed before its first checkpoint"
+    );
     let output = command(&line, folder.path()).output().unwrap();
     assert!(output.status.success(), "{}", stderr(&output));
     assert!(read(&folder, "a.exr").channels == read(&folder, "whole.exr").channels);
