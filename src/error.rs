@@ -45,6 +45,12 @@ pub enum Error {
         /// What it is there and here.
         what: String,
     },
+    /// A checkpoint that another process is writing.
+    #[error("{} is in use by another render; wait for it or name another file", path.display())]
+    Busy {
+        /// The file.
+        path: PathBuf,
+    },
     /// No device, or none that can run what was asked for.
     #[error("{what}: {missing}")]
     Unsupported {

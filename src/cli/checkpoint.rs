@@ -3,10 +3,11 @@
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
+use etendue::checkpoint::{self, Lock};
 use etendue::film::Film;
 use etendue::image_io::{Metadata, probe_writable};
 use etendue::render::{Ledger, Progress, Report, Work};
-use etendue::{Error, Result, checkpoint};
+use etendue::{Error, Result};
 
 use super::args::RenderArgs;
 use super::failure::Failure;
@@ -17,6 +18,14 @@ use super::identity::{DEVICE, JOB, check, number};
 const THROUGHPUT: &str = "work.truncated_throughput";
 const RAYS: &str = "work.rays";
 
+/// A checkpoint file to write to.
+pub struct Opened {
+    /// None of devices and pipes, which have no place beside them.
+    _lock: Option<Lock>,
+    /// What was in it.
+    pub saved: Option<Saved>,
+}
+
 /// A checkpoint that was read.
 pub struct Saved {
     path: PathBuf,
@@ -25,14 +34,23 @@ pub struct Saved {
     pub film: Film,
 }
 
-/// Finds out before the work whether checkpoints can be written, and reads the one to go on from.
-pub fn open(args: &RenderArgs) -> Result<Option<Saved>, Failure> {
+/// Finds out before the work whether checkpoints can be written, keeps others from it, and
+/// reads the one to go on from.
+pub fn open(args: &RenderArgs) -> Result<Opened, Failure> {
+    let mut opened = Opened {
+        _lock: None,
+        saved: None,
+    };
     let Some(path) = &args.checkpoint else {
-        return Ok(None);
+        return Ok(opened);
     };
     probe_writable(path).map_err(Failure::usage)?;
+    if !path.exists() || path.is_file() {
+        opened._lock = Some(checkpoint::lock(path).map_err(Failure::usage)?);
+    }
+    // somebody may have finished one before it was locked here
     if !path.exists() {
-        return Ok(None);
+        return Ok(opened);
     }
     if !args.resume {
         let what = format!(
@@ -44,7 +62,8 @@ pub fn open(args: &RenderArgs) -> Result<Option<Saved>, Failure> {
     }
     let (header, film) = checkpoint::read(path).map_err(Failure::usage)?;
     let path = path.clone();
-    Ok(Some(Saved { path, header, film }))
+    opened.saved = Some(Saved { path, header, film });
+    Ok(opened)
 }
 
 impl Saved {

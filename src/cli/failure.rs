@@ -102,7 +102,7 @@ impl Failure {
 impl From<Error> for Failure {
     fn from(error: Error) -> Self {
         let code = match error {
-            Error::Settings { .. } | Error::Mismatch { .. } => USAGE,
+            Error::Settings { .. } | Error::Mismatch { .. } | Error::Busy { .. } => USAGE,
             Error::Scene { .. } => BAD_SCENE,
             Error::Unsupported { .. } => NO_DEVICE,
             _ => FAILED,

@@ -31,7 +31,9 @@ pub fn run(args: &RenderArgs) -> Result<Outcome, Failure> {
 pub fn repeat(args: &RenderArgs, repeats: Option<&Repeat>) -> Result<Outcome, Failure> {
     let start = Instant::now();
     check_outputs(args)?;
-    let saved = checkpoint::open(args)?;
+    // held until the last checkpoint is written
+    let mut opened = checkpoint::open(args)?;
+    let saved = opened.saved.take();
     let interrupt = Interrupt::install()?;
     let mut reporter = Reporter::new(args);
     let job = prepare(args, repeats, start)?;

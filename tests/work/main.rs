@@ -5,7 +5,9 @@
 #![allow(clippy::print_stderr, reason = "a test that is skipped says so")]
 
 mod damage;
+mod disk;
 mod growth;
+mod guard;
 mod refusals;
 mod rerender;
 mod resume;
