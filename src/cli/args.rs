@@ -259,6 +259,10 @@ pub struct RenderArgs {
     #[arg(long, requires = "checkpoint")]
     pub resume: bool,
 
+    /// Check everything and say what memory the render would take, without rendering
+    #[arg(long)]
+    pub dry_run: bool,
+
     /// Write statistics as JSON
     #[arg(long, value_name = "FILE.json")]
     pub stats: Option<PathBuf>,

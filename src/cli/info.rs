@@ -3,7 +3,7 @@
 use std::fmt::Write;
 use std::path::Path;
 
-use etendue::render::{self, DeviceInfo, SceneModel};
+use etendue::render::{self, DeviceInfo, Memory, SceneModel};
 use etendue::scene::{Instance, LightKind, Material, Scene, gltf};
 use etendue::settings::Settings;
 use serde_json::{Map, Value as Json, json};
@@ -177,19 +177,8 @@ fn write_scene(text: &mut String, path: &Path, scene: &Scene, model: &SceneModel
     if let Some((low, high)) = scene.bounds() {
         line(text, &format!("  bounds              {low} … {high} m"));
     }
-    let memory = &model.memory;
-    let total = memory.geometry + memory.acceleration + memory.textures + memory.film;
-    line(
-        text,
-        &format!(
-            "  memory estimate     {}: geometry {}, acceleration {}, textures {}, film {}",
-            bytes(total),
-            bytes(memory.geometry),
-            bytes(memory.acceleration),
-            bytes(memory.textures),
-            bytes(memory.film)
-        ),
-    );
+    let memory = memory_text(&model.memory);
+    line(text, &format!("  memory estimate     {memory}"));
     let per_triangle = model.bytes_per_triangle;
     line(text, &format!("  bytes per triangle  {per_triangle:.1}"));
     for (title, on) in [("model", true), ("compiled out", false)] {
@@ -206,8 +195,21 @@ fn line(text: &mut String, line: &str) {
     writeln!(text, "{}", line.trim_end()).expect("writing to a string cannot fail");
 }
 
+/// Device memory by purpose.
+pub fn memory_text(memory: &Memory) -> String {
+    format!(
+        "{}: geometry {}, acceleration {}, textures {}, tables {}, film {}",
+        bytes(memory.total()),
+        bytes(memory.geometry),
+        bytes(memory.acceleration),
+        bytes(memory.textures),
+        bytes(memory.tables),
+        bytes(memory.film)
+    )
+}
+
 /// Bytes in the largest binary unit that leaves a whole part.
-fn bytes(bytes: u64) -> String {
+pub fn bytes(bytes: u64) -> String {
     let mut value = bytes as f64;
     for unit in ["B", "KiB", "MiB", "GiB"] {
         if value < 1024.0 {

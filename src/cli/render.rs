@@ -14,6 +14,7 @@ use super::checkpoint::{self, Keeper, Saved};
 use super::failure::{Failure, Outcome};
 use super::header::{self, Job, Record, Stop};
 use super::interrupt::Interrupt;
+use super::plan;
 use super::progress::Reporter;
 use super::rerender::Repeat;
 use super::settings::{DEFAULT_SPP, settings};
@@ -47,6 +48,11 @@ pub fn repeat(args: &RenderArgs, repeats: Option<&Repeat>) -> Result<Outcome, Fa
         device: args.device.clone(),
         validation: false,
     };
+    plan::check_host(&job.settings)?;
+    if args.dry_run {
+        plan::show(&job, &device)?;
+        return Ok(Outcome::Done);
+    }
     let mut renderer = Renderer::new(&job.scene, &job.settings, &device)?;
     introduce(&reporter, &job, &renderer);
     let (film, work) = begin(&job, saved, &renderer.report(), &reporter)?;

@@ -59,6 +59,7 @@ pub fn memory(memory: &Memory) -> Json {
         "geometry": memory.geometry,
         "acceleration": memory.acceleration,
         "textures": memory.textures,
+        "tables": memory.tables,
         "film": memory.film,
     })
 }

@@ -1,7 +1,7 @@
 //! What a device can do: every feature and limit, asked for once. Nothing else
 //! in the crate puts questions to a driver.
 
-use ash::{khr, vk};
+use ash::{ext, khr, vk};
 
 use super::failed;
 use super::instance::{Instance, has_extension, version_parts};
@@ -91,6 +91,8 @@ pub struct Caps {
     pub(super) ray_pipeline_limits: RayPipelineLimits,
     /// Whether `maintenance4` can be enabled (GLSL's LocalSizeId needs it).
     pub(super) maintenance4: bool,
+    /// Whether the driver tells how much memory is left.
+    pub(super) memory_budget: bool,
 }
 
 /// Limits of ray tracing pipelines; 0 without such.
@@ -109,6 +111,7 @@ struct Modern {
     subgroup_size: u32,
     max_buffer_bytes: u64,
     maintenance4: bool,
+    memory_budget: bool,
     scalar_block_layout: bool,
     /// Arithmetic and votes in compute shaders.
     subgroup_operations: bool,
@@ -194,6 +197,7 @@ impl Caps {
             scratch_alignment: modern.scratch_alignment,
             ray_pipeline_limits: modern.ray_pipeline_limits,
             maintenance4: modern.maintenance4,
+            memory_budget: modern.memory_budget,
         })
     }
 }
@@ -324,6 +328,7 @@ fn query_modern(instance: &Instance, physical: vk::PhysicalDevice, version: u32)
         subgroup_size: v11.subgroup_size,
         max_buffer_bytes,
         maintenance4: is_on(f13.maintenance4),
+        memory_budget: has(ext::memory_budget::NAME),
         scalar_block_layout: is_on(f12.scalar_block_layout),
         subgroup_operations: v11
             .subgroup_supported_operations

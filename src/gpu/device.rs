@@ -67,6 +67,7 @@ pub struct Device {
     names: Option<ash::ext::debug_utils::Device>,
     queue: Mutex<vk::Queue>,
     caps: Caps,
+    physical: vk::PhysicalDevice,
     root: Root,
 }
 
@@ -125,6 +126,7 @@ impl Device {
                 .then(|| ash::ext::debug_utils::Device::new(&instance.raw, raw)),
             queue: Mutex::new(queue),
             caps,
+            physical,
             root,
         }))
     }
@@ -139,6 +141,33 @@ impl Device {
     pub fn memory(&self) -> (u64, u64) {
         let report = self.allocator().generate_report();
         (report.total_allocated_bytes, report.total_capacity_bytes)
+    }
+
+    /// Bytes that may still be taken from the device's own memory, where the driver tells;
+    /// else how large it is.
+    pub fn free_memory(&self) -> u64 {
+        let is_told = self.caps.memory_budget;
+        let mut budget = vk::PhysicalDeviceMemoryBudgetPropertiesEXT::default();
+        let mut properties = vk::PhysicalDeviceMemoryProperties2::default();
+        if is_told {
+            properties = properties.push_next(&mut budget);
+        }
+        let instance = &self.root.instance.raw;
+        // SAFETY: the device is of this instance and has the extension of what is chained.
+        unsafe { instance.get_physical_device_memory_properties2(self.physical, &mut properties) };
+        let heaps = properties.memory_properties;
+        (0..)
+            .zip(heaps.memory_heaps_as_slice())
+            .filter(|(_, heap)| heap.flags.contains(vk::MemoryHeapFlags::DEVICE_LOCAL))
+            .map(|(index, heap): (usize, _)| {
+                if is_told {
+                    budget.heap_budget[index].saturating_sub(budget.heap_usage[index])
+                } else {
+                    heap.size
+                }
+            })
+            .max()
+            .unwrap_or(0)
     }
 
     /// Every error and warning of the validation layer so far; empty without validation.

@@ -10,6 +10,7 @@ mod meter;
 mod pace;
 mod passes;
 mod report;
+mod room;
 pub mod solids;
 mod traversal;
 mod upload;
@@ -28,7 +29,7 @@ use crate::settings::{BackendChoice, Settings};
 
 pub use meter::Reading;
 pub use report::{
-    Control, DeviceInfo, Feature, Ledger, Memory, Progress, Report, SceneModel, Times, Work,
+    Control, DeviceInfo, Feature, Ledger, Memory, Plan, Progress, Report, SceneModel, Times, Work,
 };
 
 use pace::Pace;
@@ -64,6 +65,8 @@ pub struct Tuning {
     pub copy_limit: usize,
     /// Compiles in everything, whether the scene needs it or not.
     pub everything: bool,
+    /// Stands for the bytes that are free on the device.
+    pub device_bytes: Option<u64>,
 }
 
 impl Default for Tuning {
@@ -73,6 +76,7 @@ impl Default for Tuning {
             max_tiles: u32::MAX,
             copy_limit: geometry::DEFAULT_COPY_LIMIT,
             everything: false,
+            device_bytes: None,
         }
     }
 }
@@ -122,7 +126,7 @@ impl Renderer {
         if tuning.everything {
             data.spec = data.spec.with_everything();
         }
-        let mut backend = VulkanBackend::new(&device, choice, &data)?;
+        let mut backend = VulkanBackend::new(&device, choice, &data, tuning.device_bytes)?;
         let build = start.elapsed().as_secs_f64();
         let start = Instant::now();
         backend.warm_up()?;
@@ -390,17 +394,32 @@ pub fn model(scene: &Scene, settings: &Settings) -> Result<SceneModel> {
     } else {
         layout::FILM_FLOATS
     };
-    let memory = Memory {
-        geometry: data.geometry.bytes(),
-        acceleration: bvh.bytes(),
-        textures: data.texture_bytes(),
-        film: pixels * 4 * u64::from(floats),
-    };
+    let memory = room::estimate(&data, Some(&bvh), pixels * 4 * u64::from(floats));
     Ok(SceneModel {
         features: features(&data.spec),
         triangles,
         bytes_per_triangle: (memory.geometry + memory.acceleration) as f64
             / triangles.max(1) as f64,
         memory,
+    })
+}
+
+/// What a render would take of a device; nothing is compiled, and nothing copied there.
+///
+/// # Errors
+/// As [`Renderer::new`].
+pub fn plan(scene: &Scene, settings: &Settings, options: &DeviceOptions) -> Result<Plan> {
+    settings.validate()?;
+    let (device, backend, backend_reason) = vulkan::open(settings.backend, options)?;
+    let data = SceneData::new(scene, settings, geometry::DEFAULT_COPY_LIMIT);
+    let bvh = traversal::own_tree(backend, &data)?;
+    let film = vulkan::film_bytes(&device, &data.params, data.spec.aovs);
+    let memory = room::estimate(&data, bvh.as_ref(), film);
+    Ok(Plan {
+        backend,
+        backend_reason,
+        device: device.caps().name.clone(),
+        memory,
+        free: room::check(&device, &memory, None)?,
     })
 }

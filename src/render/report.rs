@@ -64,8 +64,33 @@ pub struct Memory {
     pub acceleration: u64,
     /// Textures and environment maps.
     pub textures: u64,
+    /// Lists of instances, materials, media and lights.
+    pub tables: u64,
     /// Sums of samples.
     pub film: u64,
+}
+
+impl Memory {
+    /// All of it.
+    pub fn total(&self) -> u64 {
+        self.geometry + self.acceleration + self.textures + self.tables + self.film
+    }
+}
+
+/// What a render would take, told before it begins.
+#[derive(Clone, Debug)]
+pub struct Plan {
+    /// The traversal that would be used; never `Auto`.
+    pub backend: BackendChoice,
+    /// Why.
+    pub backend_reason: String,
+    /// The device's name.
+    pub device: String,
+    /// Device memory; by ray query and ray tracing pipelines without acceleration
+    /// structures, whose size only the device knows once they are built.
+    pub memory: Memory,
+    /// Bytes that are free on the device.
+    pub free: u64,
 }
 
 /// What may have changed the expected value.

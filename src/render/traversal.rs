@@ -14,10 +14,19 @@ use crate::gpu::{
     RayStages, Resource, Tlas, TlasInstance,
 };
 use crate::layout;
+use crate::settings::BackendChoice;
 use crate::spec::{Kernel, Spec, kernels};
 
 /// Invocations of a work group in both kernels: INVOCATION_GROUP of invocation.glsl.
 pub(super) const GROUP: u32 = 64;
+
+/// The own tree of a scene, where rays are traced in it.
+pub(super) fn own_tree(choice: BackendChoice, data: &SceneData) -> Result<Option<Bvh>> {
+    match choice {
+        BackendChoice::RayQuery | BackendChoice::RayPipeline => Ok(None),
+        _ => build_bvh(data).map(Some),
+    }
+}
 
 /// The own tree of a scene.
 pub(super) fn build_bvh(data: &SceneData) -> Result<Bvh> {

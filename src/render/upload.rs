@@ -80,6 +80,17 @@ impl SceneData {
         (4 * self.texels.len() + 16 * self.env_map.len() + 12 * self.env_table.len()) as u64
     }
 
+    /// Bytes of the lists that are neither geometry nor textures.
+    pub fn table_bytes(&self) -> u64 {
+        let bytes = size_of_val(&self.params)
+            + size_of_val(self.instances.as_slice())
+            + size_of_val(self.materials.as_slice())
+            + size_of_val(self.media.as_slice())
+            + size_of_val(self.texture_uses.as_slice())
+            + size_of_val(self.lights.as_slice());
+        bytes as u64
+    }
+
     fn add_materials(&mut self, scene: &Scene, solids: &Solids, first_texels: &[u32]) {
         for m in solids.materials(scene) {
             let mut record = material(m);

@@ -4,7 +4,8 @@
 use std::ops::Range;
 use std::sync::Arc;
 
-use super::traversal::{GROUP, Traversal, build_bvh, build_scene, upload_bvh};
+use super::room;
+use super::traversal::{GROUP, Traversal, build_scene, own_tree, upload_bvh};
 use super::upload::SceneData;
 use super::{DeviceOptions, Ledger, Memory};
 use crate::error::{Error, Result};
@@ -85,8 +86,18 @@ pub(super) struct VulkanBackend {
 }
 
 impl VulkanBackend {
-    pub fn new(device: &Arc<Device>, choice: BackendChoice, data: &SceneData) -> Result<Self> {
+    /// Uploads a scene; `limit` stands for the memory that is free there.
+    pub fn new(
+        device: &Arc<Device>,
+        choice: BackendChoice,
+        data: &SceneData,
+        limit: Option<u64>,
+    ) -> Result<Self> {
         let mut params = data.params;
+        let bvh = own_tree(choice, data)?;
+        let film_bytes = film_bytes(device, &params, data.spec.aovs);
+        let mut memory = room::estimate(data, bvh.as_ref(), film_bytes);
+        room::check(device, &memory, limit)?;
         let mut instances = data.instances.clone();
         let vertices = texel(
             device,
@@ -95,23 +106,21 @@ impl VulkanBackend {
             &data.geometry.vertices,
             choice != BackendChoice::Bvh,
         )?;
-        let traversal = match choice {
-            BackendChoice::RayQuery => {
-                let (scene, bytes) = build_scene(device, data, &vertices)?;
-                Traversal::Query { scene, bytes }
-            }
-            BackendChoice::RayPipeline => {
-                let (scene, bytes) = build_scene(device, data, &vertices)?;
-                Traversal::Pipeline { scene, bytes }
-            }
-            _ => {
-                let bvh = build_bvh(data)?;
+        let traversal = match bvh {
+            Some(bvh) => {
                 params.bvh_root = bvh.root;
                 for (record, placement) in instances.iter_mut().zip(&data.geometry.placements) {
                     record.bvh_root = bvh.groups[placement.group].root;
                     record.bvh_first_triangle = bvh.groups[placement.group].first_record;
                 }
                 upload_bvh(device, &bvh)?
+            }
+            None => {
+                let (scene, bytes) = build_scene(device, data, &vertices)?;
+                match choice {
+                    BackendChoice::RayPipeline => Traversal::Pipeline { scene, bytes },
+                    _ => Traversal::Query { scene, bytes },
+                }
             }
         };
         let storage = BindingKind::Storage;
@@ -192,7 +201,6 @@ impl VulkanBackend {
             ),
         ];
 
-        let film_bytes = film_bytes(device, &params, data.spec.aovs);
         let film = Buffer::new(
             device,
             "film",
@@ -221,12 +229,7 @@ impl VulkanBackend {
         ]);
         resources.extend(traversal.resources());
         let set = BindSet::new(&pipeline, "path", &resources)?;
-        let memory = Memory {
-            geometry: data.geometry.bytes(),
-            acceleration: traversal.bytes(),
-            textures: data.texture_bytes(),
-            film: film_bytes,
-        };
+        memory.acceleration = traversal.bytes();
         // A CPU driver runs its threads on contiguous runs of work groups.
         let workers = if device.caps().kind == DeviceKind::Cpu {
             std::thread::available_parallelism().map_or(1, |n| n.get() as u32)
@@ -438,7 +441,7 @@ fn film_floats(aovs: bool) -> u64 {
 }
 
 /// Bytes of a film of the whole window, or of as many rows of tiles as the device can bind.
-fn film_bytes(device: &Device, params: &layout::Params, aovs: bool) -> u64 {
+pub(super) fn film_bytes(device: &Device, params: &layout::Params, aovs: bool) -> u64 {
     let row = u64::from(params.window_width) * 4 * film_floats(aovs) * u64::from(layout::TILE);
     let rows = (device.caps().max_storage_range / row).clamp(1, u64::from(params.tiles_y));
     rows * row

@@ -8,6 +8,7 @@ mod damage;
 mod disk;
 mod growth;
 mod guard;
+mod memory;
 mod refusals;
 mod rerender;
 mod resume;
