@@ -21,6 +21,21 @@ pub(crate) const fn file_step(_name: &'static str) -> std::io::Result<()> {
     Ok(())
 }
 
+/// The plan of this thread, for another one.
+#[cfg(feature = "faults")]
+pub(crate) use armed::{give, take};
+
+#[cfg(not(feature = "faults"))]
+pub(crate) struct NoPlan;
+
+#[cfg(not(feature = "faults"))]
+pub(crate) const fn take() -> NoPlan {
+    NoPlan
+}
+
+#[cfg(not(feature = "faults"))]
+pub(crate) const fn give(_plan: NoPlan) {}
+
 #[cfg(feature = "faults")]
 mod armed {
     use std::cell::RefCell;
@@ -56,7 +71,7 @@ mod armed {
         pub manner: Manner,
     }
 
-    struct State {
+    pub(crate) struct State {
         plan: Plan,
         calls: Vec<&'static str>,
     }
@@ -95,6 +110,14 @@ mod armed {
             _ => Manner::Lasting,
         };
         arm(Plan { kind, at, manner });
+    }
+
+    pub(crate) fn take() -> Option<State> {
+        STATE.take()
+    }
+
+    pub(crate) fn give(state: Option<State>) {
+        STATE.set(state);
     }
 
     /// Whether faults of this kind are planned in this thread.

@@ -34,7 +34,7 @@ const MAY_USE: &[(&str, &[&str])] = &[
     (
         "render",
         &[
-            "bvh", "error", "film", "gpu", "layout", "mutant", "scene", "settings", "spec",
+            "bvh", "error", "fault", "film", "gpu", "layout", "mutant", "scene", "settings", "spec",
         ],
     ),
 ];

@@ -228,8 +228,8 @@ pub struct RenderArgs {
     /// How rays are traced
     #[arg(long, value_enum, default_value_t = Backend::Auto)]
     pub backend: Backend,
-    /// Vulkan device, by index or a part of its name
-    #[arg(long, value_name = "INDEX|NAME")]
+    /// Vulkan device, by index or a part of its name; several by indices between commas; all
+    #[arg(long, value_name = "INDEX|NAME|LIST|all")]
     pub device: Option<String>,
     /// Everything that lowers the error for the time, or the yardstick
     #[arg(long, value_enum, default_value_t = EstimatorName::Full)]

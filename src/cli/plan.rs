@@ -1,12 +1,14 @@
-//! What a render will take: `--dry-run`, and the memory of the host.
+//! What a render will take: devices, `--dry-run`, and the memory of the host.
 
 use std::fs;
+use std::ops::Range;
 
 use etendue::film::Film;
-use etendue::render::{self, DeviceOptions};
-use etendue::settings::Settings;
+use etendue::render::{self, DeviceInfo, DeviceOptions};
+use etendue::settings::{BackendChoice, Settings};
 use etendue::{Error, Result};
 
+use super::args::RenderArgs;
 use super::failure::Failure;
 use super::header::Job;
 use super::info::{bytes, memory_text};
@@ -44,23 +46,66 @@ pub fn check_host(settings: &Settings) -> Result<()> {
     }
 }
 
+/// The devices of `--device`: one, `all`, or several by their indices.
+pub fn devices(args: &RenderArgs) -> Result<Vec<DeviceOptions>> {
+    let options = |device: Option<String>| DeviceOptions {
+        device,
+        validation: false,
+    };
+    let Some(text) = &args.device else {
+        return Ok(vec![options(None)]);
+    };
+    let indices: Option<Vec<usize>> = text
+        .split(',')
+        .map(|part| part.trim().parse().ok())
+        .collect();
+    let indices = match indices {
+        Some(indices) => indices,
+        None if text == "all" => all(args)?,
+        // names may have commas
+        None => return Ok(vec![options(Some(text.clone()))]),
+    };
+    let option = |index: &usize| options(Some(index.to_string()));
+    Ok(indices.iter().map(option).collect())
+}
+
+/// Every device that can trace as asked. A driver that computes on the processor would
+/// only slow a machine with better ones down.
+fn all(args: &RenderArgs) -> Result<Vec<usize>> {
+    let choice = match BackendChoice::from(args.backend) {
+        BackendChoice::Auto => BackendChoice::Bvh,
+        choice => choice,
+    };
+    let is_able = |device: &DeviceInfo| {
+        let mut backends = device.backends.iter();
+        backends.any(|(backend, support)| *backend == choice && support.is_ok())
+    };
+    let able: Vec<_> = render::devices()?.into_iter().filter(is_able).collect();
+    let is_slow = |device: &DeviceInfo| device.kind == "cpu";
+    let keeps_slow = able.iter().all(is_slow);
+    let chosen = able.iter().filter(|device| keeps_slow || !is_slow(device));
+    Ok(chosen.map(|device| device.index).collect())
+}
+
 /// Says what the render would take.
-pub fn show(job: &Job, options: &DeviceOptions) -> Result<(), Failure> {
-    let plan = render::plan(&job.scene, &job.settings, options)?;
+pub fn show(job: &Job, devices: &[DeviceOptions]) -> Result<(), Failure> {
+    let mut text = String::new();
+    for options in devices {
+        let plan = render::plan(&job.scene, &job.settings, options)?;
+        text += &format!(
+            "device         {}\n\
+             backend        {} ({})\n\
+             device memory  {}; {} free\n",
+            plan.device,
+            plan.backend.name(),
+            plan.backend_reason,
+            memory_text(&plan.memory),
+            bytes(plan.free),
+        );
+    }
     let host = free_host_bytes().map_or(String::new(), |free| format!(" of {} free", bytes(free)));
-    write_stdout(&format!(
-        "device         {}\n\
-         backend        {} ({})\n\
-         samples        {}..{}\n\
-         device memory  {}; {} free\n\
-         film on host   {}{host}\n",
-        plan.device,
-        plan.backend.name(),
-        plan.backend_reason,
-        job.settings.samples.start,
-        job.settings.samples.end,
-        memory_text(&plan.memory),
-        bytes(plan.free),
-        bytes(host_bytes(&job.settings)),
-    ))
+    let needed = bytes(host_bytes(&job.settings));
+    let Range { start, end } = job.settings.samples;
+    text += &format!("film on host   {needed}{host}\nsamples        {start}..{end}\n");
+    write_stdout(&text)
 }

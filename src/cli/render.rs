@@ -5,7 +5,7 @@ use std::time::Instant;
 
 use etendue::film::Film;
 use etendue::image_io::{Format, Image, probe_writable, write_bytes, write_exr, write_png};
-use etendue::render::{Control, DeviceOptions, Progress, Renderer, Report, Work};
+use etendue::render::{Control, Progress, Report, Team, Work};
 use etendue::scene::{Environment, Scene, gltf, load_environment};
 use etendue::{Error, Result};
 
@@ -44,16 +44,13 @@ pub fn repeat(args: &RenderArgs, repeats: Option<&Repeat>) -> Result<Outcome, Fa
     if let Some(saved) = &saved {
         saved.check_job(&job)?;
     }
-    let device = DeviceOptions {
-        device: args.device.clone(),
-        validation: false,
-    };
+    let devices = plan::devices(args)?;
     plan::check_host(&job.settings)?;
     if args.dry_run {
-        plan::show(&job, &device)?;
+        plan::show(&job, &devices)?;
         return Ok(Outcome::Done);
     }
-    let mut renderer = Renderer::new(&job.scene, &job.settings, &device)?;
+    let mut renderer = Team::new(&job.scene, &job.settings, &devices)?;
     introduce(&reporter, &job, &renderer);
     let (film, work) = begin(&job, saved, &renderer.report(), &reporter)?;
 
@@ -199,7 +196,7 @@ pub fn load_scene(
 }
 
 /// Says what is going to be rendered, how, and with which parts of the model.
-fn introduce(reporter: &Reporter, job: &Job, renderer: &Renderer) {
+fn introduce(reporter: &Reporter, job: &Job, renderer: &Team) {
     let settings = &job.settings;
     let report = renderer.report();
     let names = |on: bool| {
@@ -236,7 +233,7 @@ fn introduce(reporter: &Reporter, job: &Job, renderer: &Renderer) {
 
 /// Renders until the first limit is reached.
 fn render(
-    renderer: &mut Renderer,
+    renderer: &mut Team,
     job: &Job,
     film: Film,
     before: Work,
@@ -270,7 +267,7 @@ fn render(
 }
 
 /// Keeps what was finished before a render failed, if there is a checkpoint to keep it in.
-fn rescue(error: Error, renderer: &mut Renderer, job: &Job, reporter: &Reporter) -> Error {
+fn rescue(error: Error, renderer: &mut Team, job: &Job, reporter: &Reporter) -> Error {
     let Some(path) = &job.args.checkpoint else {
         return error;
     };

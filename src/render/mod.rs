@@ -12,6 +12,7 @@ mod passes;
 mod report;
 mod room;
 pub mod solids;
+mod team;
 mod traversal;
 mod upload;
 mod view;
@@ -31,6 +32,7 @@ pub use meter::Reading;
 pub use report::{
     Control, DeviceInfo, Feature, Ledger, Memory, Plan, Progress, Report, SceneModel, Times, Work,
 };
+pub use team::Team;
 
 use pace::Pace;
 use passes::Passes;

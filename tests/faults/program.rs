@@ -110,6 +110,26 @@ fn a_lost_device_loses_no_finished_sample() {
     }
 }
 
+/// One of two devices goes, while the other goes on.
+#[test]
+fn the_loss_of_one_of_two_devices_is_survived() {
+    if !has_device() {
+        return;
+    }
+    let folder = scene();
+    // so many that each of them has its share of calls
+    let all = "--width 24 --spp 20000";
+    render(&folder, &format!("-o whole.exr {all}"));
+    let line = format!("render scene.gltf -o a.exr {all} --device 0,0");
+    for fault in ["vulkan 750 lost", "vulkan 777 lasting", "vulkan 900 lost"] {
+        let output = with_fault(&folder, &line, fault);
+        let message = stderr(&output);
+        assert!(output.status.success(), "{fault}: {message}");
+        assert!(message.contains("others go on"), "{fault}: {message}");
+        assert!(read(&folder, "a.exr").channels == read(&folder, "whole.exr").channels);
+    }
+}
+
 /// All outputs are there from before, and a checkpoint is written after every pass.
 #[test]
 fn steps_of_writing_that_fail_leave_whole_files() {

@@ -16,6 +16,7 @@ mod shards;
 #[allow(dead_code, reason = "shared with the tests of the program")]
 #[path = "../cli/support.rs"]
 mod support;
+mod team;
 
 use etendue::film::Film;
 use etendue::render::{DeviceOptions, Renderer, Tuning};
