@@ -146,13 +146,36 @@ fn signals_leave_a_checkpoint_and_what_is_finished() {
 }
 
 /// Whatever is found after `kill -9` is complete, no checkpoint is lost, and what
-/// goes on from it ends with the same picture.
+/// goes on from it ends with the same picture. Four at a time, each in a folder of its own.
 #[cfg(unix)]
 #[test]
 fn killed_renders_leave_complete_files() {
+    const WORKERS: u64 = 4;
     if !has_device() {
         return;
     }
+    let kills = rounds(60, 1000) / WORKERS;
+    let counts = std::thread::scope(|scope| {
+        let work = |worker| scope.spawn(move || kill_often(worker * kills..(worker + 1) * kills));
+        let workers: Vec<_> = (0..WORKERS).map(work).collect();
+        let counts = workers.into_iter().map(|worker| worker.join().unwrap());
+        counts.fold([0; 3], |sum, counts| {
+            std::array::from_fn(|i| sum[i] + counts[i])
+        })
+    });
+    let [met, finished, torn] = counts;
+    let kills = WORKERS * kills;
+    eprintln!("{kills} kills: {met} went on, {finished} came to the end, {torn} while writing");
+    assert!(
+        met > 0,
+        "every render was killed before its first checkpoint"
+    );
+}
+
+/// Kills once for each seed. Counts the renders that got on, those that came to the end, and
+/// the files that were being written.
+#[cfg(unix)]
+fn kill_often(seeds: std::ops::Range<u64>) -> [u64; 3] {
     let folder = scene();
     let all = "--width 64 --spp 2000";
     let start = Instant::now();
@@ -164,18 +187,20 @@ fn killed_renders_leave_complete_files() {
     );
     let path = |name: &str| folder.path().join(name);
     let (mut held, mut finished, mut met) = (0, 0, 0);
-    for round in 0..rounds(60, 1000) {
+    for seed in seeds {
         let mut child = command(&line, folder.path()).spawn().unwrap();
         // most of the time before the first sample is left out
-        std::thread::sleep(whole.mul_f64(0.4 + 0.7 * (hash(round) % 1000) as f64 / 1000.0));
+        std::thread::sleep(whole.mul_f64(0.4 + 0.7 * (hash(seed) % 1000) as f64 / 1000.0));
         // SIGKILL; a render that is done already does not mind
         child.kill().unwrap();
         child.wait().unwrap();
         if path("c.ck").exists() {
             let (_, film) = checkpoint::read(&path("c.ck")).unwrap();
-            assert!(film.samples() >= held, "round {round}");
+            assert!(film.samples() >= held, "seed {seed}");
             met += u64::from(film.samples() > held);
             held = film.samples();
+        } else {
+            assert_eq!(held, 0, "seed {seed}: the checkpoint is gone");
         }
         if path("a.exr").exists() {
             read_exr(&path("a.exr")).unwrap();
@@ -194,14 +219,12 @@ fn killed_renders_leave_complete_files() {
             finished += 1;
         }
     }
-    eprintln!("{met} went on, {finished} came to the end");
-    assert!(
-        met > 0,
-        "every render was killed before its first checkpoint"
-    );
+    let is_torn = |name: &&String| name.ends_with(".tmp");
+    let torn = list(folder.path()).iter().filter(is_torn).count();
     let output = command(&line, folder.path()).output().unwrap();
     assert!(output.status.success(), "{}", stderr(&output));
     assert!(read(&folder, "a.exr").channels == read(&folder, "whole.exr").channels);
+    [met, finished, torn as u64]
 }
 
 #[cfg(unix)]
