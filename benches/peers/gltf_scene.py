@@ -83,8 +83,13 @@ class Reader:
         return self.buffers[view["buffer"]][start:start + view["byteLength"]]
 
     def sampler(self, index):
+        """Whether texels are interpolated, and how the texture goes on: a code of glTF."""
         texture = self.gltf["textures"][index]
-        return self.gltf["samplers"][texture["sampler"]] if "sampler" in texture else {}
+        sampler = self.gltf["samplers"][texture["sampler"]] if "sampler" in texture else {}
+        wraps = {sampler.get(key, 10497) for key in ("wrapS", "wrapT")}
+        if len(wraps) > 1:
+            raise Cannot("two kinds of wrapping of one texture")
+        return sampler.get("magFilter") != 9728, wraps.pop()
 
 
 def local_matrix(node):
@@ -123,10 +128,8 @@ def material_of(gltf, index):
     if material.get("alphaMode", "OPAQUE") != "OPAQUE":
         raise Cannot(f"material {name}: alpha")
     pbr = material.get("pbrMetallicRoughness", {})
-    if "metallicRoughnessTexture" in pbr:
-        raise Cannot(f"material {name}: metallicRoughnessTexture")
-    texture = pbr.get("baseColorTexture")
-    if texture and (texture.get("texCoord", 0) or texture.get("extensions")):
+    texture, surface = pbr.get("baseColorTexture"), pbr.get("metallicRoughnessTexture")
+    if any(t and (t.get("texCoord", 0) or t.get("extensions")) for t in (texture, surface)):
         raise Cannot(f"material {name}: transformed textures")
     specular = extension(material, "KHR_materials_specular") or {}
     if any(key.endswith("Texture") for key in specular):
@@ -142,7 +145,9 @@ def material_of(gltf, index):
         "name": name,
         "color": np.array(pbr.get("baseColorFactor", [1, 1, 1, 1])[:3], float),
         "texture": texture["index"] if texture else None,
+        "surface": surface["index"] if surface else None,  # roughness in G, metallic in B
         "metallic": pbr.get("metallicFactor", 1),
+        "roughness": pbr.get("roughnessFactor", 1),
         "alpha": pbr.get("roughnessFactor", 1) ** 2,
         "ior": ior,
         "specular": specular.get("specularFactor", 1),

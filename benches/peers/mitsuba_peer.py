@@ -21,143 +21,51 @@ from gltf_scene import Cannot
 from protocol import serve
 
 VARIANT = os.environ.get("MITSUBA_VARIANT", "llvm_ad_rgb")
-# (ldsampler repeats itself along long paths: its pictures of scenes/rayleigh.gltf are off by 7 %)
-SAMPLERS = ["independent", "multijitter"]
-# Below, a microfacet surface counts as a mirror: etendue's GGX_MIN_ALPHA
-MIN_ALPHA = 1e-3
+# All that give the right mean: ldsampler repeats itself along long paths.
+SAMPLERS = os.environ.get("MITSUBA_SAMPLERS", "independent,multijitter,orthogonal,ldsampler").split(",")
 
 mi.set_variant(VARIANT)
 
-
-class Gltf(mi.BSDF):
-    """glTF's opaque surface as etendue has it (shaders/bsdf.glsl): Lambert under a coat, or metal; GGX with
-    height-correlated masking, Schlick's Fresnel factor; both sides alike."""
-
-    def __init__(self, props):
-        super().__init__(props)
-        self.base = props.get_texture("base")
-        self.metallic, self.alpha = props["metallic"], props["alpha"]
-        self.coat, self.coat_f90 = mi.Color3f(props["coat"]), props["coat_f90"]
-        self.smooth = self.alpha < MIN_ALPHA
-        sides = mi.BSDFFlags.FrontSide | mi.BSDFFlags.BackSide
-        glossy = mi.BSDFFlags.DeltaReflection if self.smooth else mi.BSDFFlags.GlossyReflection
-        self.m_components = [mi.BSDFFlags.DiffuseReflection | sides, glossy | sides]
-        self.m_flags = self.m_components[0] | self.m_components[1]
-
-    def parts(self, si):
-        """Albedo of the base, F0, F90."""
-        color = mi.Color3f(self.base.eval(si))
-        f0 = dr.lerp(self.coat, color, self.metallic)
-        return color * (1 - self.metallic), f0, dr.lerp(self.coat_f90, 1.0, self.metallic)
-
-    @staticmethod
-    def schlick(f0, f90, cosine):
-        return f0 + (f90 - f0) * dr.clip(1 - cosine, 0, 1) ** 5
-
-    def through(self, cosine):
-        """What the coat lets through to the base, one way."""
-        return 1 - self.schlick(dr.max(self.coat), self.coat_f90, cosine)
-
-    def diffuse(self, base, cos_o, cos_i):
-        return base * (dr.inv_pi * self.through(cos_o) * self.through(cos_i) / dr.maximum(1 - dr.max(self.coat), 1e-6))
-
-    def share(self, base, f0, f90, cos_o):
-        """Probability of sampling the specular lobe."""
-        specular = dr.sum(self.schlick(f0, f90, cos_o))
-        total = specular + dr.sum(base * self.through(cos_o))
-        return dr.select(total > 0, specular / total, 0)
-
-    def microfacets(self):
-        return mi.MicrofacetDistribution(mi.MicrofacetType.GGX, self.alpha, self.alpha, True)
-
-    def value_and_pdf(self, base, f0, f90, wo, wi):
-        """f · cosθi and the density of both lobes, without a mirror's; wo and wi above the surface."""
-        share = self.share(base, f0, f90, wo.z)
-        value = self.diffuse(base, wo.z, wi.z)
-        pdf = (1 - share) * dr.inv_pi * wi.z
-        if not self.smooth:
-            h = dr.normalize(wo + wi)
-            d = self.microfacets().eval(h)
-            a2 = self.alpha * self.alpha
-            root = lambda c: dr.sqrt(a2 + (1 - a2) * c * c)
-            visibility = 0.5 / (wi.z * root(wo.z) + wo.z * root(wi.z))
-            value += self.schlick(f0, f90, dr.dot(wo, h)) * d * visibility
-            pdf += share * d * 0.5 / (wo.z + root(wo.z))
-        is_valid = (wo.z > 0) & (wi.z > 0)
-        return (value * wi.z) & is_valid, dr.select(is_valid, pdf, 0)
-
-    # Mitsuba's wi is the direction to the viewer, its wo the one that is sampled.
-    def sample(self, ctx, si, sample1, sample2, active=True):
-        base, f0, f90 = self.parts(si)
-        side = dr.sign(si.wi.z)
-        view = mi.Vector3f(si.wi.x, si.wi.y, dr.abs(si.wi.z))
-        share = self.share(base, f0, f90, view.z)
-        is_specular = active & (sample1 < share)
-        bs = dr.zeros(mi.BSDFSample3f)
-        light = mi.warp.square_to_cosine_hemisphere(sample2)
-        if self.smooth:
-            bounced = mi.Vector3f(-view.x, -view.y, view.z)
-        else:
-            h, _ = self.microfacets().sample(view, sample2)
-            bounced = mi.reflect(view, h)
-        light = dr.select(is_specular, bounced, light)
-        value, pdf = self.value_and_pdf(base, f0, f90, view, light)
-        weight = dr.select(pdf > 0, value / pdf, 0)
-        if self.smooth:
-            weight = dr.select(is_specular, self.schlick(f0, f90, view.z) / share, weight)
-            pdf = dr.select(is_specular, share, pdf)
-        bs.wo = mi.Vector3f(light.x, light.y, light.z * side)
-        bs.pdf = pdf
-        bs.eta = 1.0
-        bs.sampled_component = dr.select(is_specular, mi.UInt32(1), mi.UInt32(0))
-        glossy = mi.BSDFFlags.DeltaReflection if self.smooth else mi.BSDFFlags.GlossyReflection
-        bs.sampled_type = dr.select(is_specular, mi.UInt32(int(glossy)), mi.UInt32(int(mi.BSDFFlags.DiffuseReflection)))
-        active &= (light.z > 0) & (view.z > 0) & (pdf > 0)
-        return bs, weight & active
-
-    def both(self, si, wo):
-        base, f0, f90 = self.parts(si)
-        side = dr.sign(si.wi.z)
-        view = mi.Vector3f(si.wi.x, si.wi.y, dr.abs(si.wi.z))
-        return self.value_and_pdf(base, f0, f90, view, mi.Vector3f(wo.x, wo.y, wo.z * side))
-
-    def eval(self, ctx, si, wo, active=True):
-        return self.both(si, wo)[0] & active
-
-    def pdf(self, ctx, si, wo, active=True):
-        return dr.select(active, self.both(si, wo)[1], 0)
-
-    def eval_pdf(self, ctx, si, wo, active=True):
-        value, pdf = self.both(si, wo)
-        return value & active, dr.select(active, pdf, 0)
-
-    def to_string(self):
-        return "Gltf[]"
-
-
-mi.register_bsdf("gltf", lambda props: Gltf(props))
+from mitsuba_models import MIN_ALPHA  # defines classes of the variant
 
 
 def rgb(values):
     return {"type": "rgb", "value": [float(v) for v in values]}
 
 
+def texture_of(reader, index, factors, is_color):
+    """A texture times its factors, decoded to linear before it is filtered."""
+    wraps = {10497: "repeat", 33648: "mirror", 33071: "clamp"}
+    is_linear, wrap = reader.sampler(index)
+    with tempfile.NamedTemporaryFile(suffix=".png") as file:
+        file.write(reader.image(index))
+        file.flush()
+        stored = mi.Bitmap(file.name)
+    stored.set_srgb_gamma(is_color)
+    texels = np.array(stored.convert(mi.Bitmap.PixelFormat.RGB, mi.Struct.Type.Float32, False))
+    return {"type": "bitmap", "bitmap": mi.Bitmap((texels * factors).astype(np.float32)), "raw": True,
+            "wrap_mode": wraps[wrap], "filter_type": "bilinear" if is_linear else "nearest"}
+
+
 def base_color(reader, material):
     if material["texture"] is None:
         return rgb(material["color"])
-    if np.any(material["color"] != 1):
-        raise Cannot(f"material {material['name']}: a texture times a colour")
-    sampler = reader.sampler(material["texture"])
-    wraps = {10497: "repeat", 33648: "mirror", 33071: "clamp"}
-    wrap = {wraps[sampler.get(key, 10497)] for key in ("wrapS", "wrapT")}
-    if len(wrap) > 1:
-        raise Cannot(f"material {material['name']}: two kinds of wrapping")
-    with tempfile.NamedTemporaryFile(suffix=".png") as file:
-        file.write(reader.image(material["texture"]))
-        file.flush()
-        bitmap = mi.Bitmap(file.name)
-    return {"type": "bitmap", "bitmap": bitmap, "wrap_mode": wrap.pop(),
-            "filter_type": "nearest" if sampler.get("magFilter") == 9728 else "bilinear"}
+    return texture_of(reader, material["texture"], material["color"], True)
+
+
+def gltf_surface(reader, material):
+    """Metallic factor in x, roughness in y."""
+    if material["surface"] is None:
+        surface = {"type": "rgb", "value": [float(material["metallic"]), float(material["roughness"]), 0.0]}
+    else:
+        surface = texture_of(reader, material["surface"], [1, material["roughness"], material["metallic"]], False)
+        texels = np.array(surface["bitmap"])
+        surface["bitmap"] = mi.Bitmap(np.ascontiguousarray(texels[..., [2, 1, 0]]))
+        if texels[..., 1].min() ** 2 < MIN_ALPHA:
+            raise Cannot(f"material {material['name']}: mirrors and rough places in one texture")
+    return {"type": "gltf", "base": base_color(reader, material), "surface": surface,
+            "smooth": material["surface"] is None and material["alpha"] < MIN_ALPHA,
+            "coat": mi.ScalarColor3f(material["coat"]), "coat_f90": float(material["specular"])}
 
 
 def medium_of(absorption, scattering, phase, g):
@@ -179,9 +87,7 @@ def bsdf_of(reader, material):
         if material["metallic"] == 0 and material["specular"] == 0:
             diffuse = {"type": "diffuse", "reflectance": base_color(reader, material)}
             return {"type": "twosided", "bsdf": diffuse}, None
-        return {"type": "gltf", "base": base_color(reader, material), "metallic": float(material["metallic"]),
-                "alpha": float(material["alpha"]), "coat": mi.ScalarColor3f(material["coat"]),
-                "coat_f90": float(material["specular"])}, None
+        return gltf_surface(reader, material), None
     if material["transmission"] != 1 or material["metallic"] != 0 or np.any(material["color"] != 1):
         raise Cannot(f"material {name}: glass that is also something else")
     if material["specular"] != 1 or material["medium"].get("priority", 0):
@@ -189,7 +95,7 @@ def bsdf_of(reader, material):
     rough = material["alpha"] >= MIN_ALPHA
     if not (material["volume"] or {}).get("thicknessFactor", 0) > 0:
         if rough:
-            raise Cannot(f"material {name}: a rough sheet")
+            return {"type": "sheet", "ior": float(material["ior"]), "alpha": float(material["alpha"])}, None
         return {"type": "thindielectric", "int_ior": float(material["ior"]), "ext_ior": 1.0}, None
     absorption, scattering, phase, g = gltf_scene.coefficients(material["medium"], material["volume"])
     medium = None
@@ -209,7 +115,11 @@ def light_of(light, world):
         return {"type": "point", "position": [float(v) for v in world[:3, 3]], "intensity": rgb(color)}
     if light["type"] == "directional":
         return {"type": "directional", "direction": [float(-v) for v in world[:3, 2]], "irradiance": rgb(color)}
-    raise Cannot("spot lights: their edges differ")
+    cone = light["spot"]
+    inner, outer = cone.get("innerConeAngle", 0), cone.get("outerConeAngle", np.pi / 4)
+    direction = -world[:3, 2] / np.linalg.norm(world[:3, 2])
+    return {"type": "gltfspot", "position": mi.ScalarPoint3f(world[:3, 3]), "axis": mi.ScalarVector3f(direction),
+            "color": mi.ScalarColor3f(color), "inner": float(np.cos(inner)), "outer": float(np.cos(outer))}
 
 
 def environment_of(scene):
