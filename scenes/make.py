@@ -15,7 +15,7 @@ from pathlib import Path
 # The folder is a source tree: nothing is cached in it.
 sys.dont_write_bytecode = True
 
-from generator import volumes
+from generator import rooms, volumes
 from generator.gltf import Gltf
 from generator.images import hdr, png, srgb, unit
 from generator.shapes import block, cuboid, globe, icosphere, quad, rectangle, torus
@@ -319,7 +319,7 @@ def add_exhibits(gltf):
     gltf.instances("beads", bead, places, [(0.09, 0.06 + 0.01 * i, 0.09) for i in range(8)])
 
 
-SCENES = (cornell, veach, furnace, sun, instances, lights, *volumes.SCENES)
+SCENES = (cornell, veach, furnace, sun, instances, lights, *volumes.SCENES, *rooms.SCENES)
 
 
 def files():

@@ -21,8 +21,8 @@ from gltf_scene import Cannot
 from protocol import serve
 
 VARIANT = os.environ.get("MITSUBA_VARIANT", "llvm_ad_rgb")
-# All that give the right mean: ldsampler repeats itself along long paths.
-SAMPLERS = os.environ.get("MITSUBA_SAMPLERS", "independent,multijitter,orthogonal,ldsampler").split(",")
+# (ldsampler repeats itself along long paths; whether its mean is right is for the agreement to tell)
+SAMPLERS = os.environ.get("MITSUBA_SAMPLERS", "independent,ldsampler,orthogonal,multijitter").split(",")
 
 mi.set_variant(VARIANT)
 
@@ -165,7 +165,7 @@ def mesh_of(mesh, bsdf, medium):
 
 
 def convert(path, width, height, max_depth):
-    """The scene as a dictionary, without the sampler."""
+    """The scene and the sensor as dictionaries, without sampler and integrator, and whether there are media."""
     scene = gltf_scene.load(path)
     parts, around, media = {}, [], False
     for index, mesh in enumerate(scene.meshes):
@@ -194,37 +194,40 @@ def convert(path, width, height, max_depth):
     # Mitsuba's cameras look along +z with +x to the left
     pose[:3, :3] = columns * [-1, 1, -1]
     pose[:3, 3] = scene.camera[:3, 3]
-    parts["sensor"] = {
+    sensor = {
         "type": "perspective", "fov": float(np.degrees(scene.yfov)), "fov_axis": "y",
         "near_clip": 1e-4, "far_clip": 1e6, "to_world": mi.ScalarTransform4f(pose),
         "film": {"type": "hdrfilm", "width": width, "height": height, "rfilter": {"type": "box"},
                  "pixel_format": "rgb", "component_format": "float32"},
     }
     if around:
-        parts["sensor"]["medium"] = around[0]
-    depth = max_depth + 1 if max_depth else -1
-    parts["integrator"] = {"type": "volpath" if media else "path", "max_depth": depth}
-    return {"type": "scene"} | parts
+        sensor["medium"] = around[0]
+    return {"type": "scene"} | parts, sensor, media
 
 
 class Mitsuba:
     def load(self, scene, width, height, max_depth):
-        self.scenes = {}
-        parts = convert(scene, width, height, max_depth)
-        for sampler in SAMPLERS:
-            parts["sensor"]["sampler"] = {"type": sampler}
-            self.scenes[sampler] = mi.load_dict(parts)
-        return f"Mitsuba {mi.__version__} {VARIANT}", SAMPLERS
+        parts, sensor, media = convert(scene, width, height, max_depth)
+        self.scene = mi.load_dict(parts)
+        depth = max_depth + 1 if max_depth else -1
+        integrators = ["volpath", "volpathmis"] if media else ["path"]
+        self.integrators = {name: mi.load_dict({"type": name, "max_depth": depth}) for name in integrators}
+        self.sensors = {name: mi.load_dict(sensor | {"sampler": {"type": name}}) for name in SAMPLERS}
+        # the second integrator with one sampler
+        ways = [(integrators[0], sampler) for sampler in SAMPLERS] + [(name, SAMPLERS[-1]) for name in integrators[1:]]
+        self.ways = {" ".join(way if way[0] == "volpathmis" else way[1:]): way for way in ways}
+        return f"Mitsuba {mi.__version__} {VARIANT}", list(self.ways)
 
-    def render(self, sampler, spp, seed):
-        scene = self.scenes[sampler]
+    def render(self, way, spp, seed):
+        integrator, sampler = self.ways[way]
+        sensor = self.sensors[sampler]
         start = time.perf_counter()
-        picture = mi.render(scene, spp=spp, seed=seed)
+        picture = mi.render(self.scene, sensor=sensor, integrator=self.integrators[integrator], spp=spp, seed=seed)
         dr.eval(picture)
         dr.sync_thread()
         seconds = time.perf_counter() - start
         # samplers round what they cannot stratify
-        return np.array(picture)[..., :3], scene.sensors()[0].sampler().sample_count(), seconds
+        return np.array(picture)[..., :3], sensor.sampler().sample_count(), seconds
 
 
 mitsuba = Mitsuba()
