@@ -325,7 +325,7 @@ class Cycles:
         self.overhead = 0.0
         few, many = (min(self.render(SAMPLERS[0], spp, 0)[2] for _ in range(3)) for spp in (1, 17))
         self.overhead = max(few - (many - few) / 16, 0.0)
-        return f"Cycles {bpy.app.version_string.split()[0]}", SAMPLERS
+        return SAMPLERS
 
     def render(self, sampler, spp, seed):
         scene = bpy.context.scene
@@ -348,4 +348,4 @@ class Cycles:
 
 
 cycles = Cycles()
-serve(cycles.load, cycles.render)
+serve(f"Cycles {bpy.app.version_string.split()[0]}", cycles.load, cycles.render)

@@ -216,7 +216,7 @@ class Mitsuba:
         # the second integrator with one sampler
         ways = [(integrators[0], sampler) for sampler in SAMPLERS] + [(name, SAMPLERS[-1]) for name in integrators[1:]]
         self.ways = {" ".join(way if way[0] == "volpathmis" else way[1:]): way for way in ways}
-        return f"Mitsuba {mi.__version__} {VARIANT}", list(self.ways)
+        return list(self.ways)
 
     def render(self, way, spp, seed):
         integrator, sampler = self.ways[way]
@@ -231,4 +231,4 @@ class Mitsuba:
 
 
 mitsuba = Mitsuba()
-serve(mitsuba.load, mitsuba.render)
+serve(f"Mitsuba {mi.__version__} {VARIANT}", mitsuba.load, mitsuba.render)

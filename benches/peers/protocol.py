@@ -8,21 +8,23 @@ import traceback
 import gltf_scene
 
 
-def serve(load, render):
-    """Answers requests until there are none. load(scene) → (name, samplers), render(sampler, spp, seed) → (array of
+def serve(name, load, render):
+    """Answers requests until there are none. load(scene) → samplers, render(sampler, spp, seed) → (array of
     height × width × 3, samples used, seconds); both may raise gltf_scene.Cannot."""
-    # Renderers print to stdout; that goes to stderr, and the answers to where stdout was.
+    # Renderers tell their progress on stdout; nobody reads it. The answers go to where stdout was.
     answers = os.fdopen(os.dup(1), "w")
-    os.dup2(2, 1)
+    os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
     for line in sys.stdin:
         answer = None
         try:
             request = json.loads(line)
             start = time.perf_counter()
-            if "load" in request:
-                name, samplers = load(**request["load"])
+            if "hello" in request:
+                answer = {"ready": {"name": name}}
+            elif "load" in request:
+                samplers = load(**request["load"])
                 seconds = time.perf_counter() - start
-                answer = {"loaded": {"name": name, "samplers": samplers, "build": seconds}}
+                answer = {"loaded": {"samplers": samplers, "build": seconds}}
             else:
                 job = request["render"]
                 picture, spp, seconds = render(job["sampler"], job["spp"], job["seed"])

@@ -123,7 +123,25 @@ fn run(contender: &str, spp: u64, seed: u64, seconds: f64, relmse: f64) -> Json 
 fn the_report_compares_at_equal_error() {
     let folder = tempfile::tempdir().unwrap();
     let mut text = String::from("{\"kind\":\"weather\",\"rain\":true}\n");
-    for (name, factor) in [("etendue full", 1.0), ("peer", 3.0), ("cheat", 0.1)] {
+    let starts = [
+        ("etendue full", "etendue", 18.0),
+        ("other 1.0 fast", "other 1.0", 20.0),
+    ];
+    for (contender, renderer, seconds) in starts {
+        let start = json!({
+            "kind": "start", "scene": "a <scene>", "contender": contender, "renderer": renderer,
+            "process": 1.0, "build": 2.0, "compile": seconds - 3.0,
+        });
+        text += &format!("{start}\n");
+    }
+    let contenders = [
+        ("etendue full", 1.0),
+        ("peer", 3.0),
+        ("cheat", 0.1),
+        ("other 1.0 slow", 5.0),
+        ("other 1.0 fast", 3.0),
+    ];
+    for (name, factor) in contenders {
         for seed in 1..=5 {
             for spp in [1, 4, 16] {
                 let (n, wobble) = (spp as f64, 1.0 + 0.01 * seed as f64);
@@ -138,12 +156,16 @@ fn the_report_compares_at_equal_error() {
     });
     text += &format!("{cheat}\n");
     fs::write(folder.path().join("b.jsonl"), text).unwrap();
-    succeeds("chart b.jsonl -o r.html", folder.path());
+    succeeds("chart b.jsonl -o r.html -o r.md", folder.path());
     let html = fs::read_to_string(folder.path().join("r.html")).unwrap();
     let row =
         "<td>a &lt;scene&gt;</td><td>peer</td><td class=\"n\">3</td><td class=\"n\">3 to 3</td>";
     assert!(html.contains(row), "{html}");
-    assert!(html.contains("not compared: mean off by 25 %"));
+    assert!(html.contains("not compared: mean off by 25 ± 0.1 %"));
+    // at its best, with what comes before the first sample: (20 + 3 · 16)/(18 + 16)
+    let best = "| other 1.0 | a <scene> | fast | 3 | 3 to 3 | 2 |";
+    let tables = fs::read_to_string(folder.path().join("r.md")).unwrap();
+    assert!(tables.contains(best), "{tables}");
     assert!(!html.contains("<scene>"));
 }
 
@@ -171,7 +193,7 @@ fn what_cannot_be_drawn_is_said_with_its_line() {
     }
     assert_eq!(list(folder.path()), ["b.jsonl"]);
     for (line, part) in [
-        ("chart b.jsonl -o c.png", ".svg nor .html"),
+        ("chart b.jsonl -o c.png", ".svg nor .html nor .md"),
         ("chart b.jsonl", "--output"),
         ("bench -o b.jsonl", "<SCENES>"),
         ("bench s.gltf", "--output"),

@@ -99,7 +99,7 @@ pub enum SweepName {
 pub struct ChartArgs {
     /// What `etendue bench` wrote
     pub bench: PathBuf,
-    /// Picture or report to write, .svg or .html by its suffix
+    /// Picture, report or tables to write: .svg, .html or .md by its suffix
     #[arg(short, long, value_name = "FILE", required = true)]
     pub output: Vec<PathBuf>,
 }

@@ -25,8 +25,14 @@ const REFERENCE_FACTOR: u64 = 128;
 const LEAST_FACTOR: u64 = 100;
 /// A peer whose mean is further off solves another problem.
 const ALLOWED_DIFFERENCE: f64 = 0.003;
-/// A picture of so many times the samples of the longest run joins the means of a peer.
-const CONVERGED_FACTOR: u64 = 16;
+/// A picture of so many times the samples of the longest run joins the means of a peer, and another …
+const CONVERGED_FACTOR: u64 = 4;
+/// … so often at most …
+const CONVERGED_PICTURES: u64 = 4;
+/// … until the standard error of the difference is below this.
+const CONVERGED_ERROR: f64 = 0.001;
+/// Seed of the first of them, far from those of the runs.
+const CONVERGED_SEED: u64 = 1 << 20;
 /// Samples of the render by which a budget is turned into samples.
 const PILOT_SPP: u64 = 8;
 
@@ -91,6 +97,8 @@ impl Contest<'_> {
         out.line(&Line::Start(Start {
             scene: scene.to_owned(),
             contender: name.clone(),
+            renderer: Some(String::from("etendue")),
+            process: Some(0.0),
             build: self.load + times.build,
             compile: times.compile,
         }))?;
@@ -142,13 +150,14 @@ impl Contest<'_> {
         let loaded = match loaded {
             Ok(loaded) => loaded,
             Err(error) => {
-                let contender = peer.borrow().script.clone();
+                let contender = peer.borrow().name.clone();
                 return skip(scene, &contender, &format!("{error:#}"), out);
             }
         };
+        let name = peer.borrow().name.clone();
         for sampler in loaded.samplers {
             let mut contender = Contender::Peer {
-                name: format!("{} {sampler}", loaded.name),
+                name: format!("{name} {sampler}"),
                 sampler,
                 process: Rc::clone(peer),
             };
@@ -157,6 +166,8 @@ impl Contest<'_> {
                     out.line(&Line::Start(Start {
                         scene: scene.to_owned(),
                         contender: contender.name().to_owned(),
+                        renderer: Some(name.clone()),
+                        process: Some(peer.borrow().process),
                         build: loaded.build,
                         compile: first.seconds,
                     }))?;
@@ -191,7 +202,7 @@ impl Contest<'_> {
                     let shot = contender.render(spp, seed, &out.scratch())?;
                     let errors = truth.errors(&shot.picture);
                     let mean = mean(&shot.picture);
-                    means[i].push((shot.spp, mean));
+                    means[i].push((shot.spp, truth.weighted_mean(&shot.picture)));
                     out.line(&Line::Run(Run {
                         scene: scene.to_owned(),
                         contender: contender.name().to_owned(),
@@ -222,9 +233,16 @@ impl Contest<'_> {
         let converged = CONVERGED_FACTOR * ladder.iter().copied().max().unwrap_or(1);
         for (contender, means) in contenders.iter_mut().zip(&mut means) {
             if contender.is_peer() {
-                let shot = contender.render(converged, 0, &out.scratch())?;
-                means.push((shot.spp, mean(&shot.picture)));
-                let line = agreement(scene, contender.name(), truth, means);
+                let mut line = agreement(scene, contender.name(), truth, means);
+                for picture in 0..CONVERGED_PICTURES {
+                    if line.error <= CONVERGED_ERROR {
+                        break;
+                    }
+                    let seed = CONVERGED_SEED + picture;
+                    let shot = contender.render(converged, seed, &out.scratch())?;
+                    means.push((shot.spp, truth.weighted_mean(&shot.picture)));
+                    line = agreement(scene, contender.name(), truth, means);
+                }
                 out.line(&Line::Agreement(line))?;
             }
         }
@@ -309,8 +327,8 @@ type Means = Vec<(u64, [f64; 3])>;
 
 /// The channel that deviates most decides.
 fn agreement(scene: &str, contender: &str, truth: &Reference, means: &Means) -> Agreement {
-    let [a, b] = [mean(&truth.halves[0]), mean(&truth.halves[1])];
-    let wanted = truth.mean();
+    let [a, b] = [0, 1].map(|half| truth.weighted_mean(&truth.halves[half]));
+    let wanted: [f64; 3] = std::array::from_fn(|i| 0.5 * (a[i] + b[i]));
     let brightest = wanted.iter().copied().fold(0.0, f64::max);
     let channel = |i: usize| {
         let samples: f64 = means.iter().map(|(spp, _)| *spp as f64).sum();

@@ -9,6 +9,9 @@ const EPSILON: f64 = 0.01;
 /// Share of the pixels that the trimmed error leaves out, the worst.
 const TRIMMED: f64 = 0.001;
 
+/// A pixel of more than so many times the picture's mean has less weight where means are compared.
+const BRIGHT: f64 = 4.0;
+
 /// Two independent halves of a converged picture.
 pub struct Reference {
     /// The halves.
@@ -59,6 +62,22 @@ impl Reference {
             mean,
             epsilon,
         }
+    }
+
+    /// Mean of each channel for the comparison of means: a pixel whose reference is brighter than `BRIGHT` times the
+    /// mean counts as if it was that bright, so that the edge of a small lamp does not drown the rest in noise.
+    pub fn weighted_mean(&self, picture: &[[f32; 3]]) -> [f64; 3] {
+        let whole = self.mean.iter().sum::<f64>() / self.mean.len() as f64;
+        let (mut sum, mut weights) = ([0.0; 3], 0.0);
+        for (pixel, reference) in picture.iter().zip(self.mean.chunks_exact(3)) {
+            let bright = reference.iter().sum::<f64>() / 3.0;
+            let weight = (BRIGHT * whole / bright).min(1.0);
+            for (sum, value) in sum.iter_mut().zip(pixel) {
+                *sum += weight * f64::from(*value);
+            }
+            weights += weight;
+        }
+        sum.map(|s| s / weights)
     }
 
     /// Mean of each channel.
@@ -156,6 +175,23 @@ mod tests {
         let with_speck = reference.errors(&picture);
         assert!(with_speck.relmse > 1e6);
         assert!((with_speck.relmse_trimmed - errors.relmse).abs() < 1e-12);
+    }
+
+    #[test]
+    fn bright_pixels_do_not_rule_the_comparison_of_means() {
+        let mut halves = [vec![[1.0; 3]; 1000], vec![[1.0; 3]; 1000]];
+        for half in &mut halves {
+            half[5] = [1e4; 3];
+        }
+        let reference = Reference::new(halves);
+        // the mean is 10.999: 40 times as much at most
+        let mut picture = vec![[1.1; 3]; 1000];
+        picture[5] = [1.2e4; 3];
+        let ratio =
+            reference.weighted_mean(&picture)[0] / reference.weighted_mean(&reference.halves[0])[0];
+        let share = 4.0 * 10.999;
+        let wanted = (999.0 * 1.1 + 1.2 * share) / (999.0 + share);
+        assert!((ratio - wanted).abs() < 1e-6, "{ratio} {wanted}");
     }
 
     /// Noise of variance 0.04/12 is not taken for bias, and a bias of 0.05 is found below it.

@@ -4,6 +4,7 @@
 use std::io::{BufRead, BufReader, Write};
 use std::path::{Path, PathBuf};
 use std::process::{Child, ChildStdin, ChildStdout, Command, Stdio};
+use std::time::Instant;
 
 use anyhow::{Context, Result, anyhow, bail};
 use serde::Deserialize;
@@ -19,13 +20,15 @@ pub struct Peer {
     input: ChildStdin,
     output: BufReader<ChildStdout>,
     pixels: usize,
+    /// Of the renderer, with version and variant.
+    pub name: String,
+    /// Seconds from its start until it could answer.
+    pub process: f64,
 }
 
 /// A scene that a peer is ready to render.
 #[derive(Deserialize)]
 pub struct Loaded {
-    /// Of the renderer, with version and variant.
-    pub name: String,
     /// That it can use; each makes a contender.
     pub samplers: Vec<String>,
     /// Seconds to convert, load and build.
@@ -35,6 +38,7 @@ pub struct Loaded {
 #[derive(Deserialize)]
 #[serde(rename_all = "kebab-case")]
 enum Answer {
+    Ready { name: String },
     Loaded(Loaded),
     Rendered { seconds: f64, spp: u64 },
     Cannot(String),
@@ -56,6 +60,7 @@ pub fn scripts(folder: &Path) -> Result<Vec<PathBuf>> {
 
 impl Peer {
     pub fn start(python: &str, script: &Path) -> Result<Self> {
+        let start = Instant::now();
         let mut child = Command::new(python)
             .arg(script)
             .stdin(Stdio::piped())
@@ -65,13 +70,23 @@ impl Peer {
         let input = child.stdin.take().context("the pipe to a peer")?;
         let output = child.stdout.take().context("the pipe from a peer")?;
         let name = script.file_name().unwrap_or_default();
-        Ok(Self {
+        let mut peer = Self {
             script: name.to_string_lossy().into_owned(),
             child,
             input,
             output: BufReader::new(output),
             pixels: 0,
-        })
+            name: String::new(),
+            process: 0.0,
+        };
+        match peer.ask(&json!({ "hello": {} }))? {
+            Answer::Ready { name } => {
+                peer.name = name;
+                peer.process = start.elapsed().as_secs_f64();
+            }
+            _ => bail!("{} answers another question", peer.script),
+        }
+        Ok(peer)
     }
 
     /// What it says of a scene; an error also where it cannot render it as we do.
@@ -89,7 +104,7 @@ impl Peer {
         match self.ask(&request)? {
             Answer::Loaded(loaded) => Ok(loaded),
             Answer::Cannot(reason) => bail!("{reason}"),
-            Answer::Rendered { .. } => bail!("{} answers another question", self.script),
+            _ => bail!("{} answers another question", self.script),
         }
     }
 
@@ -107,7 +122,7 @@ impl Peer {
         let (seconds, spp) = match self.ask(&request)? {
             Answer::Rendered { seconds, spp } => (seconds, spp),
             Answer::Cannot(reason) => bail!("{reason}"),
-            Answer::Loaded(_) => bail!("{} answers another question", self.script),
+            _ => bail!("{} answers another question", self.script),
         };
         let bytes = std::fs::read(scratch)
             .with_context(|| format!("read the picture of {}", self.script))?;

@@ -81,6 +81,11 @@ pub struct Scene {
 pub struct Start {
     pub scene: String,
     pub contender: String,
+    /// Of whom it is one way to render: `etendue`, or a peer's name without the sampler.
+    pub renderer: Option<String>,
+    /// From the start of a peer's process until it could be asked, the same for all scenes; 0 of etendue, which opens
+    /// the device in `build`.
+    pub process: Option<f64>,
     /// Loading, building, uploading.
     pub build: f64,
     /// Compiling; with whatever the driver or a peer had cached.

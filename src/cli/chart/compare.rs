@@ -5,11 +5,14 @@ use super::panels::runs;
 use super::{distinct, quantile};
 
 /// How many times as long another contender takes for the error that both reach.
+#[derive(Clone, Copy)]
 pub struct Ratio {
     /// Median over the seeds' pairs of curves.
     pub median: f64,
     /// Least and greatest of them.
     pub range: (f64, f64),
+    /// Median with everything before the first sample on both sides: start of the process, building, compiling.
+    pub with_start: Option<f64>,
 }
 
 /// Contenders compared with `base` on every scene: (scene, contender, ratio).
@@ -30,25 +33,31 @@ pub fn ratios(lines: &[Line], base: &str) -> Vec<(String, String, Ratio)> {
             let seeds = distinct(runs.iter().map(|r: &&Run| r.seed));
             let each = seeds.into_iter().filter_map(|seed| {
                 let (a, b) = (of(base, seed), of(other, seed));
-                ratio(&a, &b)
+                times(&a, &b)
             });
-            let each: Vec<f64> = each.collect();
+            let each: Vec<(f64, f64)> = each.collect();
             if !each.is_empty() {
-                found.push((scene.to_owned(), other.to_owned(), summary(&each)));
+                let starts = before(lines, scene, base).zip(before(lines, scene, other));
+                found.push((scene.to_owned(), other.to_owned(), summary(&each, starts)));
             }
         }
     }
     found
 }
 
-/// The geometric means over the scenes: (contender, scenes, mean).
-pub fn means(ratios: &[(String, String, Ratio)]) -> Vec<(String, usize, f64)> {
-    let names = distinct(ratios.iter().map(|r| r.1.as_str()));
-    let mean = |name: &str| {
-        let own = ratios.iter().filter(|r| r.1 == name);
-        let logs: Vec<f64> = own.map(|r| r.2.median.ln()).collect();
+/// Geometric means: of (name, ratio) the name, how many there are, and the mean.
+pub fn means<'a>(
+    ratios: impl Iterator<Item = (&'a str, f64)> + Clone,
+) -> Vec<(&'a str, usize, f64)> {
+    let names = distinct(ratios.clone().map(|r| r.0));
+    let mean = |name| {
+        let logs: Vec<f64> = ratios
+            .clone()
+            .filter(|r| r.0 == name)
+            .map(|r| r.1.ln())
+            .collect();
         let mean = (logs.iter().sum::<f64>() / logs.len() as f64).exp();
-        (name.to_owned(), logs.len(), mean)
+        (name, logs.len(), mean)
     };
     names.into_iter().map(mean).collect()
 }
@@ -61,17 +70,60 @@ pub fn disagrees<'a>(lines: &'a [Line], scene: &str, contender: &str) -> Option<
     })
 }
 
-fn summary(each: &[f64]) -> Ratio {
+/// Whose way to render a contender is; itself where the file does not tell.
+pub fn renderer<'a>(lines: &'a [Line], contender: &'a str) -> &'a str {
+    let told = lines.iter().find_map(|line| match line {
+        Line::Start(s) if s.contender == contender => s.renderer.as_deref(),
+        _ => None,
+    });
+    told.unwrap_or(contender)
+}
+
+/// Of each scene and peer the contender that needs least time: the peer at its best.
+pub fn best(
+    lines: &[Line],
+    ratios: &[(String, String, Ratio)],
+) -> Vec<(String, String, String, Ratio)> {
+    let mut found: Vec<(String, String, String, Ratio)> = Vec::new();
+    for (scene, contender, ratio) in ratios {
+        let peer = renderer(lines, contender);
+        if peer == "etendue" {
+            continue;
+        }
+        match found.iter_mut().find(|f| f.0 == *scene && f.1 == peer) {
+            Some(other) if other.3.median <= ratio.median => {}
+            Some(other) => (other.2, other.3) = (contender.clone(), *ratio),
+            None => found.push((scene.clone(), peer.to_owned(), contender.clone(), *ratio)),
+        }
+    }
+    found
+}
+
+/// Seconds before the first sample, from the start of the process.
+fn before(lines: &[Line], scene: &str, contender: &str) -> Option<f64> {
+    lines.iter().find_map(|line| match line {
+        Line::Start(s) if s.scene == scene && s.contender == contender => {
+            Some(s.process? + s.build + s.compile)
+        }
+        _ => None,
+    })
+}
+
+/// Of pairs (base, other) of seconds to one error; `starts` are the seconds before.
+fn summary(each: &[(f64, f64)], starts: Option<(f64, f64)>) -> Ratio {
+    let of = |(a, b): (f64, f64)| each.iter().map(|t| (t.1 + b) / (t.0 + a)).collect();
+    let plain: Vec<f64> = of((0.0, 0.0));
     Ratio {
-        median: quantile(each, 0.5),
-        range: (quantile(each, 0.0), quantile(each, 1.0)),
+        median: quantile(&plain, 0.5),
+        range: (quantile(&plain, 0.0), quantile(&plain, 1.0)),
+        with_start: starts.map(|s| quantile(&of(s), 0.5)),
     }
 }
 
-/// Time of `other` over that of `base` at the larger of their last errors. Curves are (seconds, relMSE).
-fn ratio(base: &[(f64, f64)], other: &[(f64, f64)]) -> Option<f64> {
+/// Seconds of `base` and of `other` to the larger of their last errors. Curves are (seconds, relMSE).
+fn times(base: &[(f64, f64)], other: &[(f64, f64)]) -> Option<(f64, f64)> {
     let target = base.last()?.1.max(other.last()?.1);
-    Some(time(other, target)? / time(base, target)?)
+    Some((time(base, target)?, time(other, target)?))
 }
 
 /// Seconds to an error: between two points on a straight line in logarithms; where even the first point is
@@ -91,6 +143,19 @@ fn time(curve: &[(f64, f64)], target: f64) -> Option<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    fn ratio(base: &[(f64, f64)], other: &[(f64, f64)]) -> Option<f64> {
+        times(base, other).map(|(a, b)| b / a)
+    }
+
+    #[test]
+    fn what_comes_before_counts_where_it_is_asked_for() {
+        let each = [(1.0, 4.0), (1.0, 3.0), (1.0, 2.0)];
+        let ratio = summary(&each, Some((0.5, 6.0)));
+        assert_eq!((ratio.median, ratio.range), (3.0, (2.0, 4.0)));
+        assert_eq!(ratio.with_start, Some(6.0));
+        assert_eq!(summary(&each, None).with_start, None);
+    }
 
     #[test]
     fn a_contender_twice_as_fast_is_twice_as_fast() {

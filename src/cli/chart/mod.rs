@@ -3,6 +3,8 @@
 mod compare;
 mod panels;
 mod report;
+mod table;
+mod tables;
 
 use std::path::Path;
 
@@ -18,10 +20,13 @@ use super::failure::{FAILED, Failure, Outcome};
 /// Reads the lines and writes every file asked for.
 pub fn run(args: &ChartArgs) -> Result<Outcome, Failure> {
     for path in &args.output {
-        if !has_suffix(path, "svg") && !has_suffix(path, "html") {
+        if !["svg", "html", "md"].iter().any(|s| has_suffix(path, s)) {
             return Err(Failure::usage(Error::Settings {
                 name: "--output",
-                what: format!("{} ends with neither .svg nor .html", path.display()),
+                what: format!(
+                    "{} ends with neither .svg nor .html nor .md",
+                    path.display()
+                ),
             }));
         }
         probe_writable(path).map_err(Failure::usage)?;
@@ -33,6 +38,8 @@ pub fn run(args: &ChartArgs) -> Result<Outcome, Failure> {
             let folder = args.bench.parent().unwrap_or(Path::new(""));
             let html = report::html(&lines, folder);
             html.map_err(|error| Failure::new(FAILED, error, "make the report"))?
+        } else if has_suffix(path, "md") {
+            report::markdown(&lines)
         } else {
             let sheet = Sheet {
                 panels: [
