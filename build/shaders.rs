@@ -5,6 +5,17 @@
 pub const SHADERS: &[(&str, &[&str], &str)] = &[
     ("kernel.comp", &["TRAVERSE_SOFTWARE"], "path_software"),
     ("kernel.comp", &["TRAVERSE_QUERY"], "path_query"),
+    // for the limit report
+    (
+        "kernel.comp",
+        &["TRAVERSE_SOFTWARE", "TRACE_TWICE"],
+        "path_twice",
+    ),
+    (
+        "kernel.comp",
+        &["TRAVERSE_SOFTWARE", "TRACE_COUNTS"],
+        "path_counts",
+    ),
     (
         "kernel.comp",
         &["TRAVERSE_SOFTWARE", "KERNEL_PROBE"],

@@ -109,6 +109,16 @@ void main()
     if (HAS_NESTED && interior_overflows != 0u) {
         atomicAdd(ledger[LEDGER_INTERIOR_OVERFLOWS], interior_overflows);
     }
+#ifdef TRACE_COUNTS
+    uvec4 counts = uvec4(invocation_sum(bvh_nodes_visited), invocation_sum(bvh_records_read), invocation_sum(bvh_steps),
+                         invocation_sum(bvh_lane_steps));
+    if (invocation_adds()) {
+        ledger_add(LEDGER_NODES_LOW, counts.x);
+        ledger_add(LEDGER_RECORDS_LOW, counts.y);
+        ledger_add(LEDGER_STEPS_LOW, counts.z);
+        ledger_add(LEDGER_LANES_LOW, counts.w);
+    }
+#endif
     uint rays_together = invocation_sum(rays);
     if (invocation_adds()) {
         ledger_add(LEDGER_RAYS_LOW, rays_together);

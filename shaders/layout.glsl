@@ -253,7 +253,13 @@ const uint LEDGER_THROUGHPUT_LOW = 4u;
 const uint LEDGER_THROUGHPUT_HIGH = 5u;
 // Solids that were entered while INTERIOR_SIZE others already held the point.
 const uint LEDGER_INTERIOR_OVERFLOWS = 6u;
-const uint LEDGER_SIZE = 7u;
+// Of the kernel that counts (TRACE_COUNTS), two words each: nodes visited, leaf records read, steps of lanes, and
+// steps that all lanes of the subgroups had time for.
+const uint LEDGER_NODES_LOW = 7u;
+const uint LEDGER_RECORDS_LOW = 9u;
+const uint LEDGER_STEPS_LOW = 11u;
+const uint LEDGER_LANES_LOW = 13u;
+const uint LEDGER_SIZE = 15u;
 
 const uint TILE = 8u;
 // log₂ of the samples of a block, with HAS_STRATA.

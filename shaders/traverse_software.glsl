@@ -241,6 +241,14 @@ uvec2 bvh_pop() {
 
 uint bvh_waiting() { return bvh_height + (bvh_newest.y != 0u ? 1u : 0u) + (bvh_older.y != 0u ? 1u : 0u); }
 
+#ifdef TRACE_COUNTS
+// What this invocation did; for the limit report.
+uint bvh_nodes_visited = 0u;
+uint bvh_records_read = 0u;
+uint bvh_steps = 0u;
+uint bvh_lane_steps = 0u; // of all lanes of the subgroup, idle ones included; counted by one of them
+#endif
+
 // Both traversals; `any_hit` ends at the first hit and is a literal at both calls.
 bool bvh_trace(vec3 origin, vec3 dir, float t_min, float t_max, uint from, bool any_hit, out Hit hit) {
     bvh_height = 0u;
@@ -252,7 +260,13 @@ bool bvh_trace(vec3 origin, vec3 dir, float t_min, float t_max, uint from, bool 
     uvec2 nodes = uvec2(params.bvh_root, 0x80000000u);
     uvec2 leaves = uvec2(0u);
     hit = Hit(t_max, vec2(0.0), NONE, NONE, NONE);
+#ifdef TRACE_COUNTS
+    uint steps = 0u;
+#endif
     while (true) {
+#ifdef TRACE_COUNTS
+        steps++;
+#endif
         if (leaves.y == 0u) {
             if ((nodes.y & BVH_NODE_BITS) == 0u) {
                 if (HAS_INSTANCES && instance != NONE && bvh_waiting() == base) {
@@ -271,6 +285,9 @@ bool bvh_trace(vec3 origin, vec3 dir, float t_min, float t_max, uint from, bool 
                 nodes.y &= ~(1u << bit);
                 if ((nodes.y & BVH_NODE_BITS) != 0u) bvh_push(nodes);
                 bvh_visit(index, ray, t_min, hit.t, nodes, leaves);
+#ifdef TRACE_COUNTS
+                bvh_nodes_visited++;
+#endif
                 // The box of a plane that the ray leaves is always met.
                 uint place = from - leaves.x;
                 if (!HAS_INSTANCES) leaves.y &= ~(place < BVH_NODE_RECORDS ? 1u << place : 0u);
@@ -281,6 +298,9 @@ bool bvh_trace(vec3 origin, vec3 dir, float t_min, float t_max, uint from, bool 
             uint record = 4u * (leaves.x + uint(findLSB(leaves.y)));
             leaves.y &= leaves.y - 1u;
             uvec4 v0 = bvh_triangle_texel(record);
+#ifdef TRACE_COUNTS
+            bvh_records_read++;
+#endif
             if (HAS_INSTANCES && instance == NONE) {
                 // A leaf entry of the top level: leave what remains for later and enter the group.
                 if ((nodes.y & BVH_NODE_BITS) != 0u) bvh_push(nodes);
@@ -304,16 +324,31 @@ bool bvh_trace(vec3 origin, vec3 dir, float t_min, float t_max, uint from, bool 
             }
         }
     }
+#ifdef TRACE_COUNTS
+    bvh_steps += steps;
+    uint longest = subgroupMax(steps);
+    bvh_lane_steps += subgroupElect() ? longest * gl_SubgroupSize : 0u;
+#endif
     return hit.primitive != NONE;
 }
 
 bool trace_closest(vec3 origin, vec3 dir, float t_min, float t_max, uint from, out Hit hit) {
-    return bvh_trace(origin, dir, t_min, t_max, from, false, hit);
+    bool is_hit = bvh_trace(origin, dir, t_min, t_max, from, false, hit);
+#ifdef TRACE_TWICE
+    // For the limit report. The same hit again, and never nearer, but the compiler does not know.
+    Hit again;
+    if (bvh_trace(origin, dir, t_min, t_max, from, false, again) && again.t < hit.t) hit = again;
+#endif
+    return is_hit;
 }
 
 bool trace_occluded(vec3 origin, vec3 dir, float t_min, float t_max, uint from) {
     Hit hit;
-    return bvh_trace(origin, dir, t_min, t_max, from, true, hit);
+    bool is_hit = bvh_trace(origin, dir, t_min, t_max, from, true, hit);
+#ifdef TRACE_TWICE
+    is_hit = bvh_trace(origin, dir, t_min, t_max, from, true, hit) || is_hit;
+#endif
+    return is_hit;
 }
 
 #endif

@@ -242,6 +242,10 @@ pub(crate) mod kernels {
 
     pub(crate) const PATH_SOFTWARE: Kernel = kernel!("path_software");
     pub(crate) const PATH_QUERY: Kernel = kernel!("path_query");
+    /// As `PATH_SOFTWARE`, but every ray is traced twice: the same image.
+    pub(crate) const PATH_TWICE: Kernel = kernel!("path_twice");
+    /// As `PATH_SOFTWARE`, and counts what traversal does.
+    pub(crate) const PATH_COUNTS: Kernel = kernel!("path_counts");
     pub(crate) const PROBE_SOFTWARE: Kernel = kernel!("probe_software");
     pub(crate) const PROBE_QUERY: Kernel = kernel!("probe_query");
     pub(crate) const PATH_PIPELINE: Kernel = kernel!("path_pipeline");

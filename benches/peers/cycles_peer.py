@@ -99,6 +99,8 @@ def surface(tree, reader, material):
     if material["transmission"] == 0:
         if material["volume"]:
             raise Cannot(f"material {name}: an opaque solid")
+        if material["surface"] is not None:
+            raise Cannot(f"material {name}: a metallic-roughness texture")
         if material["metallic"] == 0 and material["specular"] == 0:
             return node(tree, "ShaderNodeBsdfDiffuse", Color=base_color(tree, reader, material))
         if material["metallic"] != 1:

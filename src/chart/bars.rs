@@ -33,6 +33,8 @@ pub struct Bars {
     pub title: String,
     /// From the top.
     pub bars: Vec<Bar>,
+    /// Bars of a group stand in one row, each where the one before ends.
+    pub is_stacked: bool,
 }
 
 impl Bars {
@@ -42,7 +44,11 @@ impl Bars {
 
     /// Height of the panel, pixels.
     pub(super) fn height(&self) -> f64 {
-        TOP + GROUP * self.groups().count() as f64 + STEP * self.bars.len() as f64 + 20.0
+        let rows = match self.is_stacked {
+            true => self.groups().count(),
+            false => self.bars.len(),
+        };
+        TOP + GROUP * self.groups().count() as f64 + STEP * rows as f64 + 20.0
     }
 
     /// Draws the panel whose corner is given.
@@ -55,7 +61,13 @@ impl Bars {
         let style = r#"text-anchor="middle" font-weight="bold""#;
         let title = (corner.0 + WIDTH / 2.0, corner.1 + TOP - 16.0);
         canvas.text(title, &self.title, style);
-        let most = self.bars.iter().map(|b| b.high).fold(0.0, f64::max);
+        let most = match self.is_stacked {
+            true => {
+                let sums = self.groups().map(|g| g.iter().map(|b| b.value).sum());
+                sums.fold(0.0, f64::max)
+            }
+            false => self.bars.iter().map(|b| b.high).fold(0.0, f64::max),
+        };
         let left = corner.0 + LEFT;
         let length = |value: f64| match most > 0.0 {
             true => (WIDTH - LEFT - VALUE) * value / most,
@@ -65,6 +77,11 @@ impl Bars {
         for group in self.groups() {
             canvas.text((left, y + 16.0), &group[0].group, r##"fill="#555""##);
             y += GROUP;
+            if self.is_stacked {
+                self.stack(canvas, (left, y), group, &length, colour);
+                y += STEP;
+                continue;
+            }
             for bar in group {
                 let fill = format!(r#"fill="{}" fill-opacity="0.8""#, colour(&bar.name));
                 canvas.rectangle((left, y), (length(bar.value), BAR), &fill);
@@ -78,6 +95,37 @@ impl Bars {
                 canvas.text((end + 6.0, middle + 4.5), &plain(bar.value), "");
                 y += STEP;
             }
+        }
+    }
+
+    /// Draws one row of bars, each with its value inside.
+    fn stack<'a>(
+        &self,
+        canvas: &mut Canvas,
+        (left, y): At,
+        group: &[Bar],
+        length: &dyn Fn(f64) -> f64,
+        colour: &dyn Fn(&str) -> &'a str,
+    ) {
+        let mut x = left;
+        for bar in group {
+            let width = length(bar.value);
+            let fill = format!(r#"fill="{}" fill-opacity="0.8""#, colour(&bar.name));
+            canvas.rectangle((x, y), (width, BAR), &fill);
+            let style = r##"text-anchor="middle" fill="#fff""##;
+            if width > 40.0 {
+                let text = format!(
+                    "{} ± {}",
+                    plain(bar.value),
+                    plain(0.5 * (bar.high - bar.low))
+                );
+                let text = match bar.low < bar.high && width > 80.0 {
+                    true => text,
+                    false => plain(bar.value),
+                };
+                canvas.text((x + width / 2.0, y + BAR / 2.0 + 4.5), &text, style);
+            }
+            x += width;
         }
     }
 }

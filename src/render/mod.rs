@@ -69,6 +69,36 @@ pub struct Tuning {
     pub everything: bool,
     /// Stands for the bytes that are free on the device.
     pub device_bytes: Option<u64>,
+    /// Renders by a kernel that is slower and tells more.
+    pub study: Study,
+}
+
+/// Kernels for the limit report; for our own tree only.
+#[doc(hidden)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Study {
+    /// The kernel that everybody uses.
+    #[default]
+    None,
+    /// Traces every ray twice: the same image, later by the time that traversal takes.
+    Twice,
+    /// Counts what traversal does.
+    Counts,
+}
+
+/// What traversal did in a pass.
+#[doc(hidden)]
+#[derive(Clone, Copy, Debug, Default)]
+pub struct TraversalCounts {
+    pub rays: u64,
+    /// Nodes visited.
+    pub nodes: u64,
+    /// Leaf records read.
+    pub records: u64,
+    /// Steps that lanes made.
+    pub steps: u64,
+    /// Steps that all lanes of their subgroups had time for.
+    pub lane_steps: u64,
 }
 
 impl Default for Tuning {
@@ -79,6 +109,7 @@ impl Default for Tuning {
             copy_limit: geometry::DEFAULT_COPY_LIMIT,
             everything: false,
             device_bytes: None,
+            study: Study::None,
         }
     }
 }
@@ -128,7 +159,7 @@ impl Renderer {
         if tuning.everything {
             data.spec = data.spec.with_everything();
         }
-        let mut backend = VulkanBackend::new(&device, choice, &data, tuning.device_bytes)?;
+        let mut backend = VulkanBackend::new(&device, choice, &data, &tuning)?;
         let build = start.elapsed().as_secs_f64();
         let start = Instant::now();
         backend.warm_up()?;
@@ -334,6 +365,15 @@ impl Renderer {
     #[doc(hidden)]
     pub fn device_memory(&self) -> (u64, u64) {
         self.backend.device_memory()
+    }
+
+    /// What traversal did in the last pass, where [`Tuning::study`] is [`Study::Counts`].
+    ///
+    /// # Errors
+    /// The device fails.
+    #[doc(hidden)]
+    pub fn traversal_counts(&self) -> Result<TraversalCounts> {
+        self.backend.traversal_counts()
     }
 
     /// What the validation layer said so far.

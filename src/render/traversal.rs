@@ -5,6 +5,7 @@ use std::sync::Arc;
 
 use glam::Vec3;
 
+use super::Study;
 use super::upload::SceneData;
 use super::vulkan::{RECORDS, texel};
 use crate::bvh::{Bvh, GroupDesc, InstanceDesc, Quality};
@@ -120,15 +121,20 @@ impl Traversal {
         }
     }
 
-    /// Compiles the kernel that renders.
+    /// Compiles the kernel that renders; only that with the own tree can be another for the limit report.
     pub fn path_pipeline(
         &self,
         device: &Arc<Device>,
         spec: &Spec,
         bindings: &[(u32, BindingKind)],
+        study: Study,
     ) -> Result<Pipeline> {
         let kernel = match self {
-            Self::Software { .. } => kernels::PATH_SOFTWARE,
+            Self::Software { .. } => match study {
+                Study::None => kernels::PATH_SOFTWARE,
+                Study::Twice => kernels::PATH_TWICE,
+                Study::Counts => kernels::PATH_COUNTS,
+            },
             Self::Query { .. } => kernels::PATH_QUERY,
             Self::Pipeline { .. } => kernels::PATH_PIPELINE,
         };

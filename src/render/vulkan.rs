@@ -7,7 +7,7 @@ use std::sync::Arc;
 use super::room;
 use super::traversal::{GROUP, Traversal, build_scene, own_tree, upload_bvh};
 use super::upload::SceneData;
-use super::{DeviceOptions, Ledger, Memory};
+use super::{DeviceOptions, Ledger, Memory, Study, TraversalCounts, Tuning};
 use crate::error::{Error, Result};
 use crate::gpu::{
     self, BindSet, BindingKind, Buffer, Device, DeviceKind, DeviceRequest, Pipeline, Resource,
@@ -86,18 +86,18 @@ pub(super) struct VulkanBackend {
 }
 
 impl VulkanBackend {
-    /// Uploads a scene; `limit` stands for the memory that is free there.
+    /// Uploads a scene.
     pub fn new(
         device: &Arc<Device>,
         choice: BackendChoice,
         data: &SceneData,
-        limit: Option<u64>,
+        tuning: &Tuning,
     ) -> Result<Self> {
         let mut params = data.params;
         let bvh = own_tree(choice, data)?;
         let film_bytes = film_bytes(device, &params, data.spec.aovs);
         let mut memory = room::estimate(data, bvh.as_ref(), film_bytes);
-        room::check(device, &memory, limit)?;
+        room::check(device, &memory, tuning.device_bytes)?;
         let mut instances = data.instances.clone();
         let vertices = texel(
             device,
@@ -218,7 +218,7 @@ impl VulkanBackend {
         let mut bindings: Vec<_> = shared.iter().map(|(at, kind, _)| (*at, *kind)).collect();
         bindings.extend([(layout::BIND_FILM, storage), (layout::BIND_LEDGER, storage)]);
         bindings.extend(traversal.bindings());
-        let pipeline = traversal.path_pipeline(device, &data.spec, &bindings)?;
+        let pipeline = traversal.path_pipeline(device, &data.spec, &bindings, tuning.study)?;
         let mut resources: Vec<_> = shared
             .iter()
             .map(|(at, _, buffer)| (*at, Resource::Buffer(buffer)))
@@ -353,6 +353,22 @@ impl VulkanBackend {
             interior_overflows: word(layout::LEDGER_INTERIOR_OVERFLOWS),
         };
         Ok((pair(layout::LEDGER_RAYS_LOW), ledger))
+    }
+
+    /// What traversal did since the ledger was reset, by the kernel that counts.
+    pub fn traversal_counts(&self) -> Result<TraversalCounts> {
+        let words: Vec<u32> = self.ledger.read(layout::LEDGER_SIZE as usize)?;
+        let pair = |low: u32| {
+            let word = |at: u32| u64::from(words[at as usize]);
+            word(low) | word(low + 1) << 32
+        };
+        Ok(TraversalCounts {
+            rays: pair(layout::LEDGER_RAYS_LOW),
+            nodes: pair(layout::LEDGER_NODES_LOW),
+            records: pair(layout::LEDGER_RECORDS_LOW),
+            steps: pair(layout::LEDGER_STEPS_LOW),
+            lane_steps: pair(layout::LEDGER_LANES_LOW),
+        })
     }
 
     /// What given rays meet.

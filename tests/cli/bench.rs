@@ -34,7 +34,10 @@ fn a_tiny_bench_is_measured_and_drawn() {
     let folder = scene();
     let line = "bench scene.gltf -o bench.jsonl --width 16 --height 16 --spp 1,4 --seeds 3 \
                 --reference 512 -q";
-    succeeds(&format!("{line} --pictures --growth depth"), folder.path());
+    succeeds(
+        &format!("{line} --pictures --limits --growth depth"),
+        folder.path(),
+    );
     let first = lines(&folder, "bench.jsonl");
     assert_eq!(first[0]["kind"], "machine");
     assert_eq!(first[0]["schema"], 1);
@@ -62,6 +65,15 @@ fn a_tiny_bench_is_measured_and_drawn() {
         assert!(value.abs() < 4.9 * error, "{bias}");
     }
     assert_eq!(of(&first, "rate").len() % 3, 0);
+    let limits = of(&first, "limit");
+    assert_eq!(limits.len(), 3);
+    for limit in limits {
+        let number = |name: &str| limit[name].as_f64().unwrap();
+        assert!(number("nodes_per_ray") >= 1.0, "{limit}");
+        assert!((0.0..=1.0).contains(&number("lane_use")), "{limit}");
+        assert!(number("lane_use") > 0.1, "{limit}");
+        assert!(number("bandwidth") > 1e8, "{limit}");
+    }
     assert!(of(&first, "growth").len() > 3);
     assert_eq!(of(&first, "picture").len(), 3);
 
@@ -81,6 +93,7 @@ fn a_tiny_bench_is_measured_and_drawn() {
         "√relMSE",
         "bvh",
         "slope −½",
+        "shading and the rest",
     ] {
         assert!(svg.contains(text), "{text}");
         assert!(html.contains(text), "{text}");

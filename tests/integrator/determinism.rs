@@ -1,7 +1,7 @@
 //! A render is a pure function of the scene and the settings, to the bit.
 
 use etendue::film::Film;
-use etendue::render::{Control, DeviceOptions, Renderer, Tuning};
+use etendue::render::{Control, DeviceOptions, Renderer, Study, Tuning};
 use etendue::scene::{LightKind, PunctualLight, Scene};
 use etendue::settings::{BackendChoice, Crop, Settings};
 use glam::{DVec3, Vec3};
@@ -86,6 +86,15 @@ fn same_seed_gives_the_same_bits_however_the_work_is_cut() {
             },
             Tuning {
                 max_tiles: 64,
+                ..default
+            },
+            // the kernels of the limit report
+            Tuning {
+                study: Study::Twice,
+                ..default
+            },
+            Tuning {
+                study: Study::Counts,
                 ..default
             },
         ];

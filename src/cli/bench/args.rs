@@ -46,6 +46,9 @@ pub struct BenchArgs {
     /// Largest number of triangles, lights and instances of --growth
     #[arg(long, value_name = "N", default_value_t = 1_000_000, value_parser = clap::value_parser!(u64).range(1_000..=20_000_000))]
     pub growth_to: u64,
+    /// Also measure how traversal and shading share the time of our own tree, and its lanes and loads
+    #[arg(long)]
+    pub limits: bool,
     /// Also write pictures, which the chart's report shows
     #[arg(long)]
     pub pictures: bool,

@@ -6,6 +6,7 @@ mod contest;
 mod error;
 mod generated;
 mod growth;
+mod limits;
 mod peer;
 mod rates;
 pub mod record;
@@ -75,6 +76,10 @@ pub fn run(args: &BenchArgs) -> Result<Outcome, Failure> {
         rates::run(
             path, scene, &settings, &options, rounds, &device.0, &mut out,
         )?;
+        if args.limits {
+            out.note(&format!("{}: limits", scene_name(path)));
+            limits::run(path, scene, &settings, &options, rounds, &mut out)?;
+        }
     }
     for sweep in &args.growth {
         growth::run(args, *sweep, &options, &mut out)?;

@@ -25,6 +25,8 @@ pub enum Line {
     Skipped(Skipped),
     /// A render for its rate.
     Rate(Rate),
+    /// Where the time of our own tree goes.
+    Limit(Limit),
     /// A step of a growth sweep.
     Growth(Growth),
     /// A picture beside the bench file.
@@ -168,6 +170,28 @@ pub struct Rate {
     pub build: f64,
     /// Making the pipeline, seconds.
     pub compile: f64,
+}
+
+/// Where the time of our own tree goes, and how far the machine is from its limits.
+#[derive(Clone, Debug, Deserialize, Serialize)]
+pub struct Limit {
+    pub scene: String,
+    pub round: u64,
+    pub spp: u64,
+    pub seconds: f64,
+    /// Of a kernel that traces every ray twice.
+    pub seconds_twice: f64,
+    pub rays_per_second: f64,
+    /// Nodes visited.
+    pub nodes_per_ray: f64,
+    /// Leaf records read, of up to two triangles each.
+    pub records_per_ray: f64,
+    /// Of nodes and records, caches not considered.
+    pub bytes_per_ray: f64,
+    /// Share of the lanes of subgroups that trace which are at work.
+    pub lane_use: f64,
+    /// Bytes a second that this machine's processors read from memory in order.
+    pub bandwidth: f64,
 }
 
 /// A step of a growth sweep.

@@ -45,6 +45,7 @@ pub fn run(args: &ChartArgs) -> Result<Outcome, Failure> {
                 panels: [
                     panels::errors(&lines),
                     panels::rates(&lines),
+                    panels::limits(&lines),
                     panels::growth(&lines),
                 ]
                 .into_iter()
@@ -80,7 +81,12 @@ fn read(path: &Path) -> anyhow::Result<Vec<Line>> {
             _ => lines.push(line),
         }
     }
-    let measures = |line: &Line| matches!(line, Line::Run(_) | Line::Rate(_) | Line::Growth(_));
+    let measures = |line: &Line| {
+        matches!(
+            line,
+            Line::Run(_) | Line::Rate(_) | Line::Limit(_) | Line::Growth(_)
+        )
+    };
     if !lines.iter().any(measures) {
         return Err(anyhow!("{}: nothing that can be drawn", path.display()));
     }

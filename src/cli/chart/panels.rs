@@ -2,7 +2,7 @@
 
 use etendue::chart::{Axis, Bar, Bars, Curve, Panel, Plot, Point};
 
-use super::super::bench::record::{Growth, Line, Rate, Run};
+use super::super::bench::record::{Growth, Limit, Line, Rate, Run};
 use super::compare::disagrees;
 use super::{distinct, quantile};
 
@@ -110,12 +110,58 @@ pub fn rates(lines: &[Line]) -> Vec<Panel> {
         Panel::Bars(Bars {
             title: title.to_owned(),
             bars: bars.collect(),
+            is_stacked: false,
         })
     };
     vec![
         panel("million paths a second", |r| r.paths_per_second),
         panel("million rays a second", |r| r.rays_per_second),
     ]
+}
+
+pub fn limit_lines(lines: &[Line]) -> Vec<&Limit> {
+    let all = lines.iter().filter_map(|line| match line {
+        Line::Limit(limit) => Some(limit),
+        _ => None,
+    });
+    all.collect()
+}
+
+/// How traversal and shading share the time of our own tree.
+pub fn limits(lines: &[Line]) -> Vec<Panel> {
+    let all = limit_lines(lines);
+    if all.is_empty() {
+        return Vec::new();
+    }
+    let mut bars = Vec::new();
+    for scene in distinct(all.iter().map(|l| l.scene.as_str())) {
+        let own = all.iter().filter(|l| l.scene == scene);
+        let shares: Vec<f64> = own.map(|l| 100.0 * traversal_share(l)).collect();
+        let (low, high) = (quantile(&shares, BAND.0), quantile(&shares, BAND.1));
+        let share = quantile(&shares, 0.5);
+        for (name, value) in [
+            ("traversal, at least", share),
+            ("shading and the rest", 100.0 - share),
+        ] {
+            bars.push(Bar {
+                group: scene.to_owned(),
+                name: name.to_owned(),
+                value,
+                low,
+                high,
+            });
+        }
+    }
+    vec![Panel::Bars(Bars {
+        title: String::from("% of the time with our own tree"),
+        bars,
+        is_stacked: true,
+    })]
+}
+
+/// Of the time of a render: what tracing every ray a second time adds.
+pub fn traversal_share(limit: &Limit) -> f64 {
+    (limit.seconds_twice / limit.seconds - 1.0).clamp(0.0, 1.0)
 }
 
 /// What a panel of a sweep shows: title, its vertical axis, the value.

@@ -21,6 +21,7 @@ pub fn html(lines: &[Line], folder: &Path) -> Result<String> {
     let charts = [
         ("Error against time", "errors", panels::errors(lines)),
         ("Rates of the backends", "rates", panels::rates(lines)),
+        ("Limits", "limits", panels::limits(lines)),
         ("Growth", "growth", panels::growth(lines)),
     ];
     for (title, id, panels) in charts {
@@ -35,6 +36,7 @@ pub fn html(lines: &[Line], folder: &Path) -> Result<String> {
                 tables::last_runs(lines),
             ],
             "rates" => vec![tables::rates(lines)],
+            "limits" => vec![tables::limits(lines)],
             "growth" => vec![tables::slopes(lines), tables::growth(lines)],
             _ => Vec::new(),
         };
@@ -52,6 +54,7 @@ pub fn markdown(lines: &[Line]) -> String {
         tables::equal_error(lines),
         tables::last_runs(lines),
         tables::rates(lines),
+        tables::limits(lines),
         tables::slopes(lines),
         tables::growth(lines),
         tables::skipped(lines),

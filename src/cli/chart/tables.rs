@@ -2,7 +2,7 @@
 
 use etendue::chart::plain;
 
-use super::super::bench::record::{Growth, Line, Rate, Run};
+use super::super::bench::record::{Growth, Limit, Line, Rate, Run};
 use super::compare::{best as best_of, disagrees, means, ratios, renderer};
 use super::panels::{self, runs};
 use super::table::Table;
@@ -266,6 +266,50 @@ pub fn rates(lines: &[Line]) -> Table {
         ],
         texts: 2,
         rows: keys.iter().map(row).collect(),
+    }
+}
+
+/// Where the time goes, and how far the machine is from its limits.
+pub fn limits(lines: &[Line]) -> Table {
+    let all = panels::limit_lines(lines);
+    let row = |scene: &str| {
+        let of = |f: &dyn Fn(&Limit) -> f64| -> Vec<f64> {
+            let own = all.iter().filter(|l| l.scene == scene);
+            own.map(|l| f(l)).collect()
+        };
+        let median = |f: &dyn Fn(&Limit) -> f64| plain(quantile(&of(f), 0.5));
+        let shares = of(&|l| 100.0 * panels::traversal_share(l));
+        let loads = |l: &Limit| l.rays_per_second * l.bytes_per_ray;
+        vec![
+            scene.to_owned(),
+            plain(quantile(&shares, 0.5)),
+            range((quantile(&shares, 0.0), quantile(&shares, 1.0))),
+            median(&|l| l.rays_per_second / 1e6),
+            median(&|l| l.nodes_per_ray),
+            median(&|l| l.records_per_ray),
+            median(&|l| l.bytes_per_ray),
+            median(&|l| 100.0 * l.lane_use),
+            median(&|l| loads(l) / 1e9),
+            median(&|l| 100.0 * loads(l) / l.bandwidth),
+        ]
+    };
+    let scenes = distinct(all.iter().map(|l| l.scene.as_str()));
+    Table {
+        title: "Limits of our own tree",
+        head: vec![
+            "scene",
+            "traversal at least, % of time",
+            "over the rounds",
+            "Mrays/s",
+            "nodes a ray",
+            "records a ray",
+            "bytes a ray",
+            "lanes at work, %",
+            "loads, GB/s",
+            "of memory's bandwidth, %",
+        ],
+        texts: 1,
+        rows: scenes.into_iter().map(row).collect(),
     }
 }
 
