@@ -7,7 +7,7 @@ use std::sync::Arc;
 use super::room;
 use super::traversal::{GROUP, Traversal, build_scene, own_tree, upload_bvh};
 use super::upload::SceneData;
-use super::{DeviceOptions, Ledger, Memory, Study, TraversalCounts, Tuning};
+use super::{DeviceOptions, Ledger, Memory, TraversalCounts, Tuning};
 use crate::error::{Error, Result};
 use crate::gpu::{
     self, BindSet, BindingKind, Buffer, Device, DeviceKind, DeviceRequest, Pipeline, Resource,
