@@ -25,6 +25,8 @@ struct Params {
     uint height;             // full frame, pixels
     vec3 camera_forward;     // unit
     uint window_x;           // first column rendered
+    vec3 env_radiance;       // factor on the map, or the constant radiance
+    float env_choice;        // probability that direct light samples the map
     uint window_y;           // first row rendered
     uint window_width;       // columns rendered
     uint window_height;      // rows rendered
@@ -36,10 +38,8 @@ struct Params {
     uint light_count;        // entries of the light table
     float light_uniform;     // > 0: every entry of the table is chosen with this probability (textbook)
     float table_choice;      // probability that direct light samples the table; 1 − env_choice, or 0 without lights
-    vec3 env_radiance;       // factor on the map, or the constant radiance
     uint env_width;          // 0: constant
     uint env_height;
-    float env_choice;        // probability that direct light samples the map
     float env_cos_rotation;
     float env_sin_rotation;
     uint bvh_root;           // first node of the top level (of the only level without instances)
@@ -69,18 +69,21 @@ struct Batch {
 // are placed once (already in world space), or one mesh that is placed often.
 struct Instance {
     vec3 world_from_object_x; // columns of the 4 × 3 matrix
-    vec3 world_from_object_y;
-    vec3 world_from_object_z;
-    vec3 world_from_object_t;
-    vec3 object_from_world_x;
-    vec3 object_from_world_y;
-    vec3 object_from_world_z;
-    vec3 object_from_world_t;
     uint first_triangle;      // of the group, in `triangles`
+    vec3 world_from_object_y;
     uint bvh_root;            // own BVH: first node of the group
+    vec3 world_from_object_z;
     uint bvh_first_triangle;  // own BVH: first record of the group in `bvh_triangles`
+    vec3 world_from_object_t;
     uint is_identity;         // 1: the group is in world space
+    vec3 object_from_world_x;
     uint is_mirrored;         // 1: the determinant is negative
+    vec3 object_from_world_y;
+    uint reserved_0;
+    vec3 object_from_world_z;
+    uint reserved_1;
+    vec3 object_from_world_t;
+    uint reserved_2;
 };
 
 // `triangles` holds (vertex, vertex, vertex, material | TRIANGLE_* flags).
@@ -154,13 +157,14 @@ const uint MEDIUM_TEXELS = 3u;
 
 // A texture applied to a slot. `first_texel` is NONE where the slot is empty.
 struct TextureUse {
+    vec3 uv_row_u;              // u' = row · (u, v, 1)
     uint first_texel;           // in `texels`
+    vec3 uv_row_v;
     uint width;
     uint height;
     uint format;                // FORMAT_* | WRAP_* << 4 (u) | WRAP_* << 8 (v) | filter << 12
     uint uv_set;
-    vec3 uv_row_u;              // u' = row · (u, v, 1)
-    vec3 uv_row_v;
+    uint reserved_0;
 };
 
 const uint FORMAT_RGBA8 = 0u;

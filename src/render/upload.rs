@@ -449,6 +449,7 @@ fn texture_use(
         uv_set: slot.uv_set,
         uv_row_u: slot.uv_transform[0],
         uv_row_v: slot.uv_transform[1],
+        ..Default::default()
     }
 }
 
