@@ -1,7 +1,8 @@
 //! The table of shaders and how one of them becomes SPIR-V: for build.rs, and for
 //! tests/mutants, which compiles changed ones.
 
-/// (source, macros, output). A macro chooses which traversal or kernel is included and nothing else.
+/// (source, macros, output). A macro chooses which traversal or kernel is included, or what
+/// holds the arrays, and nothing else.
 pub const SHADERS: &[(&str, &[&str], &str)] = &[
     ("kernel.comp", &["TRAVERSE_SOFTWARE"], "path_software"),
     ("kernel.comp", &["TRAVERSE_QUERY"], "path_query"),
@@ -26,6 +27,8 @@ pub const SHADERS: &[(&str, &[&str], &str)] = &[
         &["TRAVERSE_QUERY", "KERNEL_PROBE"],
         "probe_query",
     ),
+    // as path_software, with what wgpu lacks left out
+    ("kernel.comp", &["TRAVERSE_SOFTWARE", "WGPU"], "path_wgpu"),
     ("kernel.rgen", &["TRAVERSE_PIPELINE"], "path_pipeline"),
     (
         "kernel.rgen",
@@ -84,11 +87,24 @@ pub fn compile(
 ) -> Vec<u8> {
     let text = read(source).expect("the shader table names files that exist");
     let mut options = shaderc::CompileOptions::new().expect("shaderc starts");
-    options.set_target_env(
-        shaderc::TargetEnv::Vulkan,
-        shaderc::EnvVersion::Vulkan1_2 as u32,
-    );
-    options.set_target_spirv(shaderc::SpirvVersion::V1_5);
+    // naga knows no OpCopyLogical, by which newer SPIR-V copies structs, and refuses the
+    // control flow that the optimiser makes (docs/decisions.md).
+    let (vulkan, spirv, level) = if macros.contains(&"WGPU") {
+        let plain = shaderc::OptimizationLevel::Zero;
+        (
+            shaderc::EnvVersion::Vulkan1_1,
+            shaderc::SpirvVersion::V1_3,
+            plain,
+        )
+    } else {
+        (
+            shaderc::EnvVersion::Vulkan1_2,
+            shaderc::SpirvVersion::V1_5,
+            level,
+        )
+    };
+    options.set_target_env(shaderc::TargetEnv::Vulkan, vulkan as u32);
+    options.set_target_spirv(spirv);
     options.set_optimization_level(level);
     options.set_warnings_as_errors();
     for name in macros {

@@ -10,6 +10,7 @@ source scripts/setup.sh
 unset DISPLAY WAYLAND_DISPLAY
 # Nothing may pass by being skipped, and two tests must not share one device.
 export ETENDUE_REQUIRE_DEVICE=1 RUST_TEST_THREADS=1
+readonly WGPU_RUST_VERSION=1.87
 
 summary=()
 started=$SECONDS
@@ -33,7 +34,11 @@ validate_shaders() {
     local newest file count=0
     newest="$(ls -td "$CARGO_TARGET_DIR"/release/build/etendue-*/out | head -n 1)"
     for file in "$newest"/*.spv; do
-        spirv-val --target-env vulkan1.2 --scalar-block-layout "$file" || return 1
+        # devices of wgpu have no scalar layout
+        case "$file" in
+        */path_wgpu.spv) spirv-val --target-env vulkan1.1 "$file" || return 1 ;;
+        *) spirv-val --target-env vulkan1.2 --scalar-block-layout "$file" || return 1 ;;
+        esac
         count=$((count + 1))
     done
     echo "$count modules are valid"
@@ -71,6 +76,16 @@ fi
 # Before the others, which then find the program without the feature.
 step "calls and files that fail do no harm" \
     cargo test --release --locked --features faults --test faults
+# wgpu takes minutes to compile: its tests run every night, the gate looks at types and lints only.
+if ! at_least "$(rustc --version | cut -d' ' -f2)" "$WGPU_RUST_VERSION"; then
+    skip "the feature wgpu: it needs Rust $WGPU_RUST_VERSION"
+elif [[ "${ETENDUE_NIGHTLY:-}" == 1 ]]; then
+    step "pictures through wgpu are the same (nightly)" run_tests --features wgpu --lib --test wgpu
+elif cargo clippy --version >/dev/null 2>&1; then
+    step "no warnings with the feature wgpu (clippy)" cargo clippy --release --lib --bins --test wgpu --features wgpu --locked -- -D warnings
+else
+    skip "the feature wgpu: clippy is not installed (Debian package rust-clippy)"
+fi
 step "every test passes, on a device (cargo test)" run_tests "$@"
 step "the documentation builds without warnings" document
 

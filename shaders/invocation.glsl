@@ -25,8 +25,14 @@ layout(local_size_x = 64, local_size_y = 1, local_size_z = 1) in;
 
 uint invocation_group() { return gl_WorkGroupID.x; }
 uint invocation_place() { return gl_LocalInvocationID.x; }
+#ifdef WGPU
+// naga's SPIR-V front end knows no election.
+uint invocation_sum(uint value) { return value; }
+bool invocation_adds() { return true; }
+#else
 uint invocation_sum(uint value) { return subgroupAdd(value); }
 bool invocation_adds() { return subgroupElect(); }
+#endif
 bool invocation_any(bool value) { return subgroupAny(value); }
 
 #endif

@@ -1,5 +1,5 @@
-// Entry of every compute kernel. A macro chooses the traversal (traverse.glsl)
-// and the kernel, and nothing else.
+// Entry of every compute kernel. A macro chooses the traversal (traverse.glsl), the
+// kernel, or with WGPU what wgpu can bind and naga read, and nothing else.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_KHR_shader_subgroup_arithmetic : require

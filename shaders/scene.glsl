@@ -9,16 +9,30 @@
 
 layout(binding = BIND_PARAMS, scalar) uniform ParamsBlock { Params params; };
 layout(binding = BIND_INSTANCES, scalar) readonly buffer InstancesBlock { Instance instances[]; };
+layout(binding = BIND_TEXTURE_USES, scalar) readonly buffer TextureUsesBlock { TextureUse texture_uses[]; };
+layout(binding = BIND_ENV_TABLE, scalar) readonly buffer EnvTableBlock { EnvTexel env_table[]; };
+
+// wgpu has no texel buffers; the same records then are storage buffers.
+#ifdef WGPU
+#define texelFetch(array, i) array[i]
+layout(binding = BIND_TRIANGLES, scalar) readonly buffer TrianglesBlock { uvec4 triangles[]; };
+layout(binding = BIND_VERTICES, scalar) readonly buffer VerticesBlock { vec4 vertices[]; };
+layout(binding = BIND_ATTRIBUTES, scalar) readonly buffer AttributesBlock { vec4 attributes[]; };
+layout(binding = BIND_MATERIALS, scalar) readonly buffer MaterialsBlock { uvec4 materials[]; };
+layout(binding = BIND_TEXELS, scalar) readonly buffer TexelsBlock { uint texels[]; };
+layout(binding = BIND_LIGHTS, scalar) readonly buffer LightsBlock { uvec4 lights[]; };
+layout(binding = BIND_ENV_MAP, scalar) readonly buffer EnvMapBlock { vec4 env_map[]; };
+layout(binding = BIND_MEDIA, scalar) readonly buffer MediaBlock { uvec4 media[]; };
+#else
 layout(binding = BIND_TRIANGLES) uniform usamplerBuffer triangles;
 layout(binding = BIND_VERTICES) uniform samplerBuffer vertices;
 layout(binding = BIND_ATTRIBUTES) uniform samplerBuffer attributes;
 layout(binding = BIND_MATERIALS) uniform usamplerBuffer materials;
-layout(binding = BIND_TEXTURE_USES, scalar) readonly buffer TextureUsesBlock { TextureUse texture_uses[]; };
 layout(binding = BIND_TEXELS) uniform usamplerBuffer texels;
 layout(binding = BIND_LIGHTS) uniform usamplerBuffer lights;
 layout(binding = BIND_ENV_MAP) uniform samplerBuffer env_map;
 layout(binding = BIND_MEDIA) uniform usamplerBuffer media;
-layout(binding = BIND_ENV_TABLE, scalar) readonly buffer EnvTableBlock { EnvTexel env_table[]; };
+#endif
 
 // The material's words; groups that are not used cost nothing.
 Material scene_material(uint index)

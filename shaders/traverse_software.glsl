@@ -17,8 +17,13 @@
 #ifndef TRAVERSE_SOFTWARE_GLSL
 #define TRAVERSE_SOFTWARE_GLSL
 
+#ifdef WGPU
+layout(binding = BIND_BVH_NODES, scalar) readonly buffer BvhNodesBlock { uvec4 bvh_nodes[]; };
+layout(binding = BIND_BVH_TRIANGLES, scalar) readonly buffer BvhTrianglesBlock { uvec4 bvh_triangles[]; };
+#else
 layout(binding = BIND_BVH_NODES) uniform usamplerBuffer bvh_nodes;
 layout(binding = BIND_BVH_TRIANGLES) uniform usamplerBuffer bvh_triangles;
+#endif
 
 // The builder bounds the depth of both levels so that this is enough.
 const uint BVH_STACK_SIZE = 32u;

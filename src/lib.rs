@@ -18,6 +18,8 @@ pub mod scene;
 pub mod selftest;
 pub mod settings;
 pub mod spec;
+#[cfg(feature = "wgpu")]
+mod wgpu;
 
 pub use error::{Error, Result};
 

@@ -20,9 +20,28 @@ pub enum BackendChoice {
     RayPipeline,
     /// Our own bounding volume hierarchy in a compute shader.
     Bvh,
+    /// The same through wgpu, whose naga translates the shader and adds its checks.
+    #[cfg(feature = "wgpu")]
+    Wgpu,
+    /// The same through wgpu and naga without checks at run time.
+    #[cfg(feature = "wgpu")]
+    WgpuUnchecked,
+    /// The same through wgpu, which hands the shader to the driver as it is.
+    #[cfg(feature = "wgpu")]
+    WgpuSpirv,
 }
 
 impl BackendChoice {
+    /// The three ways through wgpu, the most usual one first; none in builds without it.
+    pub const WGPU: &[Self] = &[
+        #[cfg(feature = "wgpu")]
+        Self::Wgpu,
+        #[cfg(feature = "wgpu")]
+        Self::WgpuUnchecked,
+        #[cfg(feature = "wgpu")]
+        Self::WgpuSpirv,
+    ];
+
     /// The name on the command line and in files.
     pub fn name(self) -> &'static str {
         match self {
@@ -30,6 +49,12 @@ impl BackendChoice {
             Self::RayQuery => "ray-query",
             Self::RayPipeline => "ray-pipeline",
             Self::Bvh => "bvh",
+            #[cfg(feature = "wgpu")]
+            Self::Wgpu => "wgpu",
+            #[cfg(feature = "wgpu")]
+            Self::WgpuUnchecked => "wgpu-unchecked",
+            #[cfg(feature = "wgpu")]
+            Self::WgpuSpirv => "wgpu-spirv",
         }
     }
 }

@@ -248,6 +248,8 @@ pub(crate) mod kernels {
     pub(crate) const PATH_COUNTS: Kernel = kernel!("path_counts");
     pub(crate) const PROBE_SOFTWARE: Kernel = kernel!("probe_software");
     pub(crate) const PROBE_QUERY: Kernel = kernel!("probe_query");
+    #[cfg(feature = "wgpu")]
+    pub(crate) const PATH_WGPU: Kernel = kernel!("path_wgpu");
     pub(crate) const PATH_PIPELINE: Kernel = kernel!("path_pipeline");
     pub(crate) const PROBE_PIPELINE: Kernel = kernel!("probe_pipeline");
     /// What the ray generation shaders call.

@@ -25,6 +25,7 @@ const MAY_USE: &[(&str, &[&str])] = &[
     ("compare", &["error", "image_io"]),
     ("checkpoint", &["error", "film", "image_io", "settings"]),
     ("spec", &["mutant", "scene", "settings"]),
+    ("wgpu", &["error", "gpu", "settings"]),
     (
         "selftest",
         &[
@@ -34,7 +35,8 @@ const MAY_USE: &[(&str, &[&str])] = &[
     (
         "render",
         &[
-            "bvh", "error", "fault", "film", "gpu", "layout", "mutant", "scene", "settings", "spec",
+            "bvh", "error", "fault", "film", "gpu", "layout", "mutant", "scene", "settings",
+            "spec", "wgpu",
         ],
     ),
 ];

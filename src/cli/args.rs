@@ -304,6 +304,16 @@ pub enum Backend {
     RayPipeline,
     /// Own bounding volume hierarchy in a compute shader; needs no ray tracing hardware
     Bvh,
+    /// The same through wgpu, for comparison of speed
+    #[cfg(feature = "wgpu")]
+    #[value(alias = "wgpu-checked")]
+    Wgpu,
+    /// The same through wgpu, without naga's checks at run time
+    #[cfg(feature = "wgpu")]
+    WgpuUnchecked,
+    /// The same through wgpu, with the shader as it is
+    #[cfg(feature = "wgpu")]
+    WgpuSpirv,
 }
 
 impl From<Backend> for BackendChoice {
@@ -313,6 +323,12 @@ impl From<Backend> for BackendChoice {
             Backend::RayQuery => Self::RayQuery,
             Backend::RayPipeline => Self::RayPipeline,
             Backend::Bvh => Self::Bvh,
+            #[cfg(feature = "wgpu")]
+            Backend::Wgpu => Self::Wgpu,
+            #[cfg(feature = "wgpu")]
+            Backend::WgpuUnchecked => Self::WgpuUnchecked,
+            #[cfg(feature = "wgpu")]
+            Backend::WgpuSpirv => Self::WgpuSpirv,
         }
     }
 }

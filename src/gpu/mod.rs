@@ -29,6 +29,8 @@ mod device;
 #[doc(hidden)]
 pub mod faults;
 mod instance;
+#[cfg(feature = "wgpu")]
+pub(crate) mod passthrough;
 mod pipeline;
 mod rays;
 #[cfg(feature = "faults")]

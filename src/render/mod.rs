@@ -2,6 +2,7 @@
 //! collects the film. A render is a pure function of (scene, settings); batch
 //! sizes, and stopping and going on, do not change a bit of it.
 
+mod backend;
 pub mod geometry;
 mod light_tree;
 mod lights;
@@ -17,6 +18,8 @@ mod traversal;
 mod upload;
 mod view;
 mod vulkan;
+#[cfg(feature = "wgpu")]
+mod wgpu;
 
 use std::ops::Range;
 use std::time::Instant;
@@ -24,7 +27,7 @@ use std::time::Instant;
 use crate::error::{Error, Result};
 use crate::film::Film;
 use crate::gpu::{self, Caps};
-use crate::layout::{self, ProbeHit, ProbeRay};
+use crate::layout::{ProbeHit, ProbeRay};
 use crate::scene::Scene;
 use crate::settings::{BackendChoice, Settings};
 
@@ -34,10 +37,13 @@ pub use report::{
 };
 pub use team::Team;
 
+#[cfg(feature = "wgpu")]
+use self::wgpu::WgpuBackend;
+use backend::{Backend, Band, Batch};
 use pace::Pace;
 use passes::Passes;
 use upload::SceneData;
-use vulkan::{Band, Batch, VulkanBackend};
+use vulkan::VulkanBackend;
 
 /// A batch aims at this long, seconds: far below the watchdogs of drivers (2 s on Windows).
 const BATCH_SECONDS: f64 = 0.1;
@@ -116,7 +122,7 @@ impl Default for Tuning {
 
 /// Renders one scene with one group of settings on one device.
 pub struct Renderer {
-    backend: VulkanBackend,
+    backend: Box<dyn Backend>,
     settings: Settings,
     tuning: Tuning,
     tiles_per_batch: u32,
@@ -159,7 +165,13 @@ impl Renderer {
         if tuning.everything {
             data.spec = data.spec.with_everything();
         }
-        let mut backend = VulkanBackend::new(&device, choice, &data, &tuning)?;
+        let mut backend: Box<dyn Backend> = match choice {
+            #[cfg(feature = "wgpu")]
+            way if BackendChoice::WGPU.contains(&way) => {
+                Box::new(WgpuBackend::new(device.caps(), way, &data)?)
+            }
+            _ => Box::new(VulkanBackend::new(&device, choice, &data, &tuning)?),
+        };
         let build = start.elapsed().as_secs_f64();
         let start = Instant::now();
         backend.warm_up()?;
@@ -313,7 +325,7 @@ impl Renderer {
         between: &mut dyn FnMut(f64) -> Control,
     ) -> Result<Option<Vec<f32>>> {
         let mut values = Vec::new();
-        for Band { tiles, pixels } in self.backend.bands() {
+        for Band { tiles, pixels } in self.backend.frame().bands() {
             let mut tile = tiles.start;
             while tile < tiles.end {
                 let count = self.tiles_per_batch.min(tiles.end - tile);
@@ -338,7 +350,9 @@ impl Renderer {
                 tile += count;
                 self.tiles_per_batch =
                     next_batch(self.tiles_per_batch, count, seconds).min(self.tuning.max_tiles);
-                if between(f64::from(tile) / f64::from(self.backend.tiles())) == Control::Stop {
+                if between(f64::from(tile) / f64::from(self.backend.frame().tiles()))
+                    == Control::Stop
+                {
                     return Ok(None);
                 }
             }
@@ -404,17 +418,21 @@ fn features(spec: &crate::spec::Spec) -> Vec<Feature> {
 pub fn devices() -> Result<Vec<DeviceInfo>> {
     let info = |caps: Caps| {
         let (major, minor, patch) = caps.api_version;
+        let through_wgpu = BackendChoice::WGPU.iter();
         DeviceInfo {
             index: caps.index,
             name: caps.name,
             kind: caps.kind.name().to_owned(),
             driver: caps.driver,
             api_version: format!("{major}.{minor}.{patch}"),
-            backends: vec![
+            backends: [
                 (BackendChoice::RayQuery, caps.ray_query),
                 (BackendChoice::RayPipeline, caps.ray_pipeline),
-                (BackendChoice::Bvh, caps.compute),
-            ],
+                (BackendChoice::Bvh, caps.compute.clone()),
+            ]
+            .into_iter()
+            .chain(through_wgpu.map(|way| (*way, caps.compute.clone())))
+            .collect(),
             subgroup: caps.subgroup_size,
         }
     };
@@ -431,11 +449,7 @@ pub fn model(scene: &Scene, settings: &Settings) -> Result<SceneModel> {
     let triangles = data.geometry.triangles.len() as u64;
     let window = settings.window();
     let pixels = u64::from(window.x1 - window.x0) * u64::from(window.y1 - window.y0);
-    let floats = if settings.aovs {
-        layout::FILM_FLOATS_AOV
-    } else {
-        layout::FILM_FLOATS
-    };
+    let floats = backend::film_floats(settings.aovs);
     let memory = room::estimate(&data, Some(&bvh), pixels * 4 * u64::from(floats));
     Ok(SceneModel {
         features: features(&data.spec),
@@ -455,7 +469,8 @@ pub fn plan(scene: &Scene, settings: &Settings, options: &DeviceOptions) -> Resu
     let (device, backend, backend_reason) = vulkan::open(settings.backend, options)?;
     let data = SceneData::new(scene, settings, geometry::DEFAULT_COPY_LIMIT);
     let bvh = traversal::own_tree(backend, &data)?;
-    let film = vulkan::film_bytes(&device, &data.params, data.spec.aovs);
+    let range = device.caps().max_storage_range;
+    let film = backend::film_bytes(range, &data.params, data.spec.aovs);
     let memory = room::estimate(&data, bvh.as_ref(), film);
     Ok(Plan {
         backend,

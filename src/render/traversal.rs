@@ -78,6 +78,20 @@ pub(super) fn build_bvh(data: &SceneData) -> Result<Bvh> {
     Bvh::build(&groups, &instances, Quality::Balanced)
 }
 
+/// Tells the kernels where the trees of the groups and of the top level start.
+pub(super) fn note_roots(
+    bvh: &Bvh,
+    data: &SceneData,
+    params: &mut layout::Params,
+    instances: &mut [layout::Instance],
+) {
+    params.bvh_root = bvh.root;
+    for (record, placement) in instances.iter_mut().zip(&data.geometry.placements) {
+        record.bvh_root = bvh.groups[placement.group].root;
+        record.bvh_first_triangle = bvh.groups[placement.group].first_record;
+    }
+}
+
 fn world_from_object(record: &layout::Instance) -> [[f32; 3]; 4] {
     [
         record.world_from_object_x,

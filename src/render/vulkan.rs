@@ -1,11 +1,11 @@
 //! The Vulkan side of a render: buffers, pipeline, batches. What the
 //! traversals do not share is in `traversal`.
 
-use std::ops::Range;
 use std::sync::Arc;
 
+use super::backend::{Backend, Batch, Frame, film_bytes, film_floats, read_ledger, workers};
 use super::room;
-use super::traversal::{GROUP, Traversal, build_scene, own_tree, upload_bvh};
+use super::traversal::{GROUP, Traversal, build_scene, note_roots, own_tree, upload_bvh};
 use super::upload::SceneData;
 use super::{DeviceOptions, Ledger, Memory, TraversalCounts, Tuning};
 use crate::error::{Error, Result};
@@ -52,23 +52,6 @@ pub(super) fn open(
     Ok((device, BackendChoice::Bvh, reason))
 }
 
-/// Rows of tiles whose film fits one buffer.
-pub(super) struct Band {
-    pub tiles: Range<u32>,
-    /// Pixels of the window, row by row.
-    pub pixels: Range<u32>,
-}
-
-/// Some tiles, an aligned power of two of samples.
-pub(super) struct Batch {
-    pub first_sample: u64,
-    pub samples: u32,
-    pub tiles: Range<u32>,
-    pub film_first_pixel: u32,
-    /// Lanes of a subgroup start their samples together.
-    pub is_together: bool,
-}
-
 /// A scene on a device, ready to render batches.
 pub(super) struct VulkanBackend {
     device: Arc<Device>,
@@ -95,7 +78,7 @@ impl VulkanBackend {
     ) -> Result<Self> {
         let mut params = data.params;
         let bvh = own_tree(choice, data)?;
-        let film_bytes = film_bytes(device, &params, data.spec.aovs);
+        let film_bytes = film_bytes(device.caps().max_storage_range, &params, data.spec.aovs);
         let mut memory = room::estimate(data, bvh.as_ref(), film_bytes);
         room::check(device, &memory, tuning.device_bytes)?;
         let mut instances = data.instances.clone();
@@ -108,11 +91,7 @@ impl VulkanBackend {
         )?;
         let traversal = match bvh {
             Some(bvh) => {
-                params.bvh_root = bvh.root;
-                for (record, placement) in instances.iter_mut().zip(&data.geometry.placements) {
-                    record.bvh_root = bvh.groups[placement.group].root;
-                    record.bvh_first_triangle = bvh.groups[placement.group].first_record;
-                }
+                note_roots(&bvh, data, &mut params, &mut instances);
                 upload_bvh(device, &bvh)?
             }
             None => {
@@ -230,12 +209,6 @@ impl VulkanBackend {
         resources.extend(traversal.resources());
         let set = BindSet::new(&pipeline, "path", &resources)?;
         memory.acceleration = traversal.bytes();
-        // A CPU driver runs its threads on contiguous runs of work groups.
-        let workers = if device.caps().kind == DeviceKind::Cpu {
-            std::thread::available_parallelism().map_or(1, |n| n.get() as u32)
-        } else {
-            1
-        };
         Ok(Self {
             device: Arc::clone(device),
             traversal,
@@ -246,24 +219,26 @@ impl VulkanBackend {
             ledger,
             pipeline,
             set,
-            workers,
+            workers: workers(device.caps().kind == DeviceKind::Cpu),
             memory,
         })
     }
+}
 
-    pub fn memory(&self) -> Memory {
+impl Backend for VulkanBackend {
+    fn memory(&self) -> Memory {
         self.memory
     }
 
-    pub fn device_memory(&self) -> (u64, u64) {
+    fn device_memory(&self) -> (u64, u64) {
         self.device.memory()
     }
 
-    pub fn validation_messages(&self) -> Vec<String> {
+    fn validation_messages(&self) -> Vec<String> {
         self.device.validation_messages()
     }
 
-    pub fn set_seed(&mut self, seed: u64) -> Result<()> {
+    fn set_seed(&mut self, seed: u64) -> Result<()> {
         self.params.seed_low = seed as u32;
         self.params.seed_high = (seed >> 32) as u32;
         let mut inputs = self.shared.iter();
@@ -272,57 +247,16 @@ impl VulkanBackend {
         buffer.write(0, &[self.params])
     }
 
-    /// Tiles of the window.
-    pub fn tiles(&self) -> u32 {
-        self.params.tiles_x * self.params.tiles_y
+    fn frame(&self) -> Frame<'_> {
+        Frame {
+            params: &self.params,
+            aovs: self.spec.aovs,
+            film_bytes: self.film.bytes(),
+        }
     }
 
-    /// The window in parts whose film fits the buffer.
-    pub fn bands(&self) -> Vec<Band> {
-        let floats = film_floats(self.spec.aovs);
-        let row_bytes = u64::from(self.params.window_width) * 4 * floats * u64::from(layout::TILE);
-        let rows = ((self.film.bytes() / row_bytes) as u32).max(1);
-        (0..self.params.tiles_y)
-            .step_by(rows as usize)
-            .map(|row| {
-                let end = (row + rows).min(self.params.tiles_y);
-                let pixel_row = |r: u32| {
-                    (r * layout::TILE).min(self.params.window_height) * self.params.window_width
-                };
-                Band {
-                    tiles: row * self.params.tiles_x..end * self.params.tiles_x,
-                    pixels: pixel_row(row)..pixel_row(end),
-                }
-            })
-            .collect()
-    }
-
-    /// Makes the driver compile: no sample is taken.
-    pub fn warm_up(&mut self) -> Result<()> {
-        let batch = Batch {
-            first_sample: 0,
-            samples: 0,
-            tiles: 0..1,
-            film_first_pixel: 0,
-            is_together: false,
-        };
-        self.render(&batch).map(|_| ())
-    }
-
-    /// Renders a batch into the film buffer; returns seconds.
-    pub fn render(&mut self, batch: &Batch) -> Result<f64> {
-        let count = batch.tiles.len() as u32;
-        let push = layout::Batch {
-            first_sample_low: batch.first_sample as u32,
-            first_sample_high: (batch.first_sample >> 32) as u32,
-            sample_count: batch.samples,
-            first_tile: batch.tiles.start,
-            tile_count: count,
-            interleave: self.workers,
-            film_first_pixel: batch.film_first_pixel,
-            is_together: u32::from(batch.is_together),
-        };
-        let groups = count.div_ceil(self.workers) * self.workers;
+    fn render(&mut self, batch: &Batch) -> Result<f64> {
+        let (push, groups) = batch.push(self.workers);
         let time = self.device.run("path", |commands| {
             self.traversal
                 .launch(commands, &self.pipeline, &self.set, &push, groups);
@@ -330,33 +264,22 @@ impl VulkanBackend {
         Ok(time.wall)
     }
 
-    /// Appends the film of a band of `pixels`.
-    pub fn read(&self, pixels: usize, values: &mut Vec<f32>) -> Result<()> {
+    fn read(&self, pixels: usize, values: &mut Vec<f32>) -> Result<()> {
         let start = values.len();
         values.resize(start + pixels * film_floats(self.spec.aovs) as usize, 0.0);
         self.film.read_into(&mut values[start..])
     }
 
-    pub fn reset_ledger(&self) -> Result<()> {
+    fn reset_ledger(&self) -> Result<()> {
         self.ledger.write(0, &[0u32; layout::LEDGER_SIZE as usize])
     }
 
-    /// Rays traced, and what may have changed the expected value.
-    pub fn ledger(&self) -> Result<(u64, Ledger)> {
+    fn ledger(&self) -> Result<(u64, Ledger)> {
         let words: Vec<u32> = self.ledger.read(layout::LEDGER_SIZE as usize)?;
-        let word = |at: u32| u64::from(words[at as usize]);
-        let pair = |low: u32| word(low) | word(low + 1) << 32;
-        let ledger = Ledger {
-            non_finite: word(layout::LEDGER_NON_FINITE),
-            truncated_paths: word(layout::LEDGER_TRUNCATED),
-            truncated_throughput: pair(layout::LEDGER_THROUGHPUT_LOW) as f64 / 65_536.0,
-            interior_overflows: word(layout::LEDGER_INTERIOR_OVERFLOWS),
-        };
-        Ok((pair(layout::LEDGER_RAYS_LOW), ledger))
+        Ok(read_ledger(&words))
     }
 
-    /// What traversal did since the ledger was reset, by the kernel that counts.
-    pub fn traversal_counts(&self) -> Result<TraversalCounts> {
+    fn traversal_counts(&self) -> Result<TraversalCounts> {
         let words: Vec<u32> = self.ledger.read(layout::LEDGER_SIZE as usize)?;
         let pair = |low: u32| {
             let word = |at: u32| u64::from(words[at as usize]);
@@ -371,8 +294,7 @@ impl VulkanBackend {
         })
     }
 
-    /// What given rays meet.
-    pub fn probe(&self, rays: &[ProbeRay]) -> Result<Vec<ProbeHit>> {
+    fn probe(&self, rays: &[ProbeRay]) -> Result<Vec<ProbeHit>> {
         let storage = BindingKind::Storage;
         let mut bindings: Vec<_> = self
             .shared
@@ -446,19 +368,4 @@ pub(super) fn texel<T: bytemuck::Pod>(
         usage
     };
     Buffer::from_slice(device, name, usage, data)
-}
-
-fn film_floats(aovs: bool) -> u64 {
-    u64::from(if aovs {
-        layout::FILM_FLOATS_AOV
-    } else {
-        layout::FILM_FLOATS
-    })
-}
-
-/// Bytes of a film of the whole window, or of as many rows of tiles as the device can bind.
-pub(super) fn film_bytes(device: &Device, params: &layout::Params, aovs: bool) -> u64 {
-    let row = u64::from(params.window_width) * 4 * film_floats(aovs) * u64::from(layout::TILE);
-    let rows = (device.caps().max_storage_range / row).clamp(1, u64::from(params.tiles_y));
-    rows * row
 }
