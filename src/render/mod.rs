@@ -3,6 +3,7 @@
 //! sizes, and stopping and going on, do not change a bit of it.
 
 mod backend;
+mod emitters;
 pub mod geometry;
 mod light_tree;
 mod lights;
