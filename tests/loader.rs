@@ -3,7 +3,8 @@
 //! built here.
 #![allow(
     clippy::unwrap_used,
-    reason = "the lint's exception for tests does not reach their helpers"
+    clippy::print_stdout,
+    reason = "the lint's exception for tests does not reach their helpers; figures are printed"
 )]
 
 #[path = "loader/broken.rs"]

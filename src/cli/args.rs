@@ -235,6 +235,10 @@ pub struct RenderArgs {
     #[arg(long, value_enum, default_value_t = EstimatorName::Full)]
     pub estimator: EstimatorName,
 
+    /// Share of samples that may be dropped, since they were not finite, before the render counts as failed
+    #[arg(long, value_name = "X", default_value_t = 1e-6, allow_negative_numbers = true, value_parser = not_negative)]
+    pub max_dropped: f64,
+
     /// Extra layers of the EXR, separated by commas
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = aov())]
     pub aov: Vec<String>,

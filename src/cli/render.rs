@@ -79,6 +79,7 @@ pub fn repeat(args: &RenderArgs, repeats: Option<&Repeat>) -> Result<Outcome, Fa
     warn_about(&record, &reporter);
     let finished = finish(&record, &reporter, start);
     saved.and(finished)?;
+    check_dropped(&record)?;
     Ok(match stop {
         Stop::Interrupt => Outcome::Interrupted,
         _ => Outcome::Done,
@@ -339,6 +340,22 @@ fn warn_about(record: &Record, reporter: &Reporter) {
             "the default of {DEFAULT_SPP} samples was reached before --time or --noise; --spp raises it"
         ));
     }
+}
+
+/// A picture that lost more samples than the arguments allow is kept, but is no success.
+fn check_dropped(record: &Record) -> Result<(), Failure> {
+    let (report, args) = (record.report, record.job.args);
+    let dropped = report.ledger.non_finite;
+    if dropped as f64 <= args.max_dropped * report.paths as f64 {
+        return Ok(());
+    }
+    Err(Failure::from(Error::Image {
+        path: args.output[0].clone(),
+        what: format!(
+            "{dropped} of {} samples were not finite, more than the share of {:e} that --max-dropped allows; the files are written",
+            report.paths, args.max_dropped
+        ),
+    }))
 }
 
 /// Writes every file, the remaining ones also when one fails.

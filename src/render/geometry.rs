@@ -2,9 +2,13 @@
 //! read. Meshes that are placed once go to world space, into one group; meshes
 //! that are placed often keep a group of their own unless copying them is cheap.
 
+use std::path::PathBuf;
+
 use glam::{DAffine3, DMat3, DVec3, Vec3};
 
 use super::solids::Solids;
+use crate::bvh::MAX_COORDINATE;
+use crate::error::{Error, Result};
 use crate::layout;
 use crate::scene::{AlphaMode, Mesh, Scene};
 
@@ -144,6 +148,32 @@ impl Geometry {
                 .any(|t| t[3] & layout::TRIANGLE_IS_MASKED != 0);
         }
         geometry
+    }
+
+    /// What no traversal can take is refused before the driver sees it.
+    ///
+    /// # Errors
+    /// A vertex or a placement is not finite or too far away.
+    pub fn check(&self) -> Result<()> {
+        let limit = f64::from(MAX_COORDINATE);
+        let positions = self.vertices.iter().step_by(2);
+        // NaN fails the comparison as well.
+        let is_near = |p: DVec3| p.to_array().iter().all(|x| x.abs() <= limit);
+        let far = positions.map(|p| Vec3::from_slice(&p[..3]).as_dvec3());
+        let places = self.placements.iter().map(|p| p.world_from_object);
+        let columns = places.flat_map(|p| {
+            let m = p.matrix3;
+            [m.x_axis, m.y_axis, m.z_axis, p.translation]
+        });
+        match far.chain(columns).find(|p| !is_near(*p)) {
+            None => Ok(()),
+            Some(p) => Err(Error::Scene {
+                path: PathBuf::from("(geometry)"),
+                what: format!(
+                    "a vertex or a placement at {p} is not a number or beyond {limit:e} m; rescale the scene"
+                ),
+            }),
+        }
     }
 
     /// Whether there is more than the group in world space.

@@ -163,6 +163,7 @@ impl Renderer {
         let start = Instant::now();
         let (device, choice, reason) = vulkan::open(settings.backend, options)?;
         let mut data = SceneData::new(scene, settings, tuning.copy_limit);
+        data.geometry.check()?;
         if tuning.everything {
             data.spec = data.spec.with_everything();
         }

@@ -120,6 +120,44 @@ fn signals_stop_at_a_pass_and_keep_what_is_finished() {
     }
 }
 
+/// Light near the end of fp32 reflects beyond it: such samples are dropped, counted in the header and in the statistics,
+/// and too many of them fail the render, after its files are written.
+#[test]
+fn too_many_samples_that_are_not_finite_fail_the_render() {
+    if !has_device() {
+        return;
+    }
+    let folder = scene();
+    let path = folder.path().join("scene.gltf");
+    let mut scene: Json = serde_json::from_str(&fs::read_to_string(&path).unwrap()).unwrap();
+    scene["scenes"][0]["extensions"]["ETENDUE_environment"]["radiance"] = json!([3e38, 0, 0]);
+    scene["materials"][0]["emissiveFactor"] = json!([1, 1, 1]);
+    let strength = json!({ "KHR_materials_emissive_strength": { "emissiveStrength": 3e38 } });
+    scene["materials"][0]["extensions"] = strength;
+    fs::write(&path, scene.to_string()).unwrap();
+    let line =
+        "render scene.gltf -o a.exr --stats a.json --spp 1 --width 16 --height 8 --camera wide";
+    let failed = etendue(line, folder.path());
+    let message = stderr(&failed);
+    assert_eq!(failed.status.code(), Some(1), "{message}");
+    assert!(message.contains("--max-dropped") && message.contains("not finite"));
+    let image = read(&folder, "a.exr");
+    let dropped = number(&image, "ledger.non_finite");
+    // The square is in view, and not everywhere.
+    assert!((1.0..128.0).contains(&dropped), "{dropped}");
+    let red = image.channel("R").unwrap();
+    assert!(red.iter().all(|v| v.is_finite()) && red.contains(&0.0));
+    let statistics: Json =
+        serde_json::from_str(&fs::read_to_string(folder.path().join("a.json")).unwrap()).unwrap();
+    assert_eq!(statistics["ledger"]["non_finite"], json!(dropped as u64));
+
+    // Whoever knows of them may allow them; they are still told.
+    let allowed = etendue(&format!("{line} --max-dropped 1"), folder.path());
+    assert_eq!(allowed.status.code(), Some(0));
+    assert!(stderr(&allowed).contains("not finite"));
+    println!("{dropped} of 128 samples dropped: exit code 1");
+}
+
 #[test]
 fn an_unknown_device_is_named() {
     if !has_device() {

@@ -22,6 +22,9 @@ fn device_passes_its_tests() {
     let json: Json = serde_json::from_str(&stdout(&output)).unwrap();
     assert_eq!(json["failed"], 0);
     let checks = json["checks"].as_array().unwrap();
+    for check in checks {
+        println!("{}: {}", check["name"], check["measured"]);
+    }
     let of = |group: &str| checks.iter().filter(|c| c["group"] == group).count();
     // Two more of rays for each backend, and one for their agreement.
     assert_eq!((of("numbers"), of("physics")), (12, 7));

@@ -377,6 +377,33 @@ fn image_bombs_are_refused_by_their_header() {
     );
 }
 
+/// Pictures that end early, at every 64th byte and near their end, are errors that name them.
+#[test]
+fn truncated_images_are_refused() {
+    let mut noise = 1u32;
+    let mut texel = |_, _| {
+        noise = noise.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+        image::Rgb(noise.to_le_bytes()[1..].try_into().unwrap())
+    };
+    let picture = image::DynamicImage::ImageRgb8(image::RgbImage::from_fn(24, 24, &mut texel));
+    let mut jpeg = std::io::Cursor::new(Vec::new());
+    picture
+        .write_to(&mut jpeg, image::ImageFormat::Jpeg)
+        .unwrap();
+    let mut cuts = 0;
+    for (name, whole) in [("PNG", encode(&picture)), ("JPEG", jpeg.into_inner())] {
+        let ends = (0..whole.len()).step_by(64).chain([whole.len() - 14]);
+        for end in ends {
+            let mut asset = textured(json!({ "emissiveTexture": { "index": 0 } }));
+            asset.set("/images/0/uri", json!(data_uri(&whole[..end])));
+            let what = refusal(asset.load(), &format!("{name} cut at {end}"));
+            assert!(what.contains("images[0]"), "{name} cut at {end}: {what}");
+            cuts += 1;
+        }
+    }
+    println!("{cuts} cuts refused");
+}
+
 /// CRC-32 of PNG chunks.
 fn crc32(bytes: &[u8]) -> u32 {
     !bytes.iter().fold(!0_u32, |crc, byte| {

@@ -49,11 +49,23 @@ pub(super) fn decode(
     let mut reader = ImageReader::with_format(Cursor::new(bytes), format);
     reader.limits(limits);
     let decoded = reader.decode().map_err(broken)?;
+    if format == ImageFormat::Jpeg && !is_whole_jpeg(bytes) {
+        return Err(String::from("ends before its end: the JPEG is incomplete"));
+    }
     Ok(Decoded {
         width,
         height,
         texels: to_texels(decoded, color_space),
     })
+}
+
+/// Whether a JPEG has its end. The decoder paints what is missing grey.
+/// Within a scan no marker but restarts can occur, so the last scan starts before the end of the image.
+fn is_whole_jpeg(bytes: &[u8]) -> bool {
+    const START_OF_SCAN: [u8; 2] = [0xFF, 0xDA];
+    const END_OF_IMAGE: [u8; 2] = [0xFF, 0xD9];
+    let last = |marker: [u8; 2]| bytes.windows(2).rposition(|pair| pair == marker);
+    last(END_OF_IMAGE) > last(START_OF_SCAN)
 }
 
 /// Refuses images without pixels or with sides beyond the limit.
