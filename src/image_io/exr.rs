@@ -8,8 +8,8 @@ use std::path::Path;
 use ::exr::meta::attribute::Chromaticities;
 use ::exr::prelude::{
     AnyChannel, AnyChannels, AttributeValue, Blocks, Compression, Encoding, FlatSamples,
-    Image as ExrImage, IntegerBounds, Layer, LayerAttributes, LineOrder, ReadChannels, ReadLayers,
-    Text, Vec2, WritableImage, read,
+    Image as ExrImage, IntegerBounds, Layer, LayerAttributes, LineOrder, MetaData, ReadChannels,
+    ReadLayers, Text, Vec2, WritableImage, read,
 };
 
 use super::{Channel, Image, Metadata, Value, atomic};
@@ -100,6 +100,7 @@ pub fn read_exr(path: &Path) -> Result<Image> {
         path: path.to_owned(),
         source,
     })?;
+    check_claims(&bytes).map_err(fail)?;
     let file = read()
         .no_deep_data()
         .largest_resolution_level()
@@ -140,6 +141,37 @@ pub fn read_exr(path: &Path) -> Result<Image> {
         channels: channels.collect(),
         metadata,
     })
+}
+
+/// Before memory is taken for it: a file must be large enough for the pixels that its header claims, or they must be few.
+fn check_claims(bytes: &[u8]) -> Result<(), String> {
+    /// Taken on trust, bytes.
+    const FEW: u64 = 1 << 26;
+    /// Pictures compress further than this only if they are all but empty.
+    const MOST_COMPRESSED: u64 = 1 << 14;
+    let meta = MetaData::read_from_buffered(Cursor::new(bytes), false)
+        .map_err(|error| format!("cannot be decoded: {error}"))?;
+    for header in &meta.headers {
+        let size = header.layer_size;
+        // Each chunk has eight bytes in a table at least.
+        if header.chunk_count > bytes.len() / 8 {
+            return Err(format!("claims {} chunks", header.chunk_count));
+        }
+        let values = (size.width() as u64)
+            .saturating_mul(size.height() as u64)
+            .saturating_mul(header.channels.list.len() as u64);
+        let claimed = values.saturating_mul(4);
+        let is_huge = size.width().max(size.height()) > MAX_SIDE as usize;
+        if is_huge || claimed > FEW.max(MOST_COMPRESSED * bytes.len() as u64) {
+            return Err(format!(
+                "claims {} × {} pixels, which {} bytes cannot hold",
+                size.width(),
+                size.height(),
+                bytes.len()
+            ));
+        }
+    }
+    Ok(())
 }
 
 /// Data and display window in our terms, if they can be expressed.

@@ -106,6 +106,10 @@ pub(crate) fn decode_map(
     most_texels: u64,
 ) -> Result<DecodedMap, String> {
     const EXR_MAGIC: &[u8] = &[0x76, 0x2f, 0x31, 0x01];
+    /// Bytes of texels that a header is trusted with, whatever the size of the file.
+    const FEW: u64 = 1 << 26;
+    /// Pictures compress further than this only if they are all but empty.
+    const MOST_COMPRESSED: u64 = 1 << 14;
     let check = |width: u64, height: u64| {
         let cap = u64::from(longest_side);
         if width == 0 || height == 0 {
@@ -114,6 +118,12 @@ pub(crate) fn decode_map(
         if width > cap || height > cap {
             return Err(format!(
                 "is {width} × {height} pixels, larger than the cap of {cap} × {cap} (Limits::image_side)"
+            ));
+        }
+        if width * height * 12 > FEW.max(MOST_COMPRESSED * bytes.len() as u64) {
+            return Err(format!(
+                "claims {width} × {height} pixels, which {} bytes cannot hold",
+                bytes.len()
             ));
         }
         if width * height > most_texels {
@@ -185,6 +195,10 @@ fn decode_exr(
     for header in &meta.headers {
         let size = header.layer_size;
         check(size.width() as u64, size.height() as u64)?;
+        // Each chunk has eight bytes in a table at least.
+        if header.chunk_count > bytes.len() / 8 {
+            return Err(format!("claims {} chunks", header.chunk_count));
+        }
     }
     let image = exr::prelude::read()
         .no_deep_data()
