@@ -46,13 +46,19 @@ pub fn open(scene: &Scene, settings: &Settings, tuning: Tuning) -> Option<Render
     }
 }
 
+/// Of the random numbers: always the same, unless `ETENDUE_SEED` says another one.
+fn seed() -> u64 {
+    let asked = std::env::var("ETENDUE_SEED").ok();
+    asked.and_then(|n| n.parse().ok()).unwrap_or(1)
+}
+
 /// A square frame of `side` pixels and `samples` samples with our own tree.
 pub fn settings(side: u32, samples: u64) -> Settings {
     Settings {
         width: side,
         height: side,
         samples: 0..samples,
-        seed: 1,
+        seed: seed(),
         backend: BackendChoice::Bvh,
         ..Settings::default()
     }

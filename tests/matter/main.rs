@@ -11,6 +11,8 @@
 
 #[path = "../common/mod.rs"]
 mod common;
+#[path = "../common/solids.rs"]
+mod solids;
 
 mod closed;
 mod cube;
@@ -23,60 +25,15 @@ mod slab;
 
 use common::*;
 use etendue::film::Film;
-use etendue::scene::{Material, Medium, Mesh, Phase, Volume};
 use etendue::settings::BackendChoice;
-use glam::{DVec3, Vec3};
+use glam::DVec3;
+use solids::*;
 
 /// Standard errors between an estimate and what it is allowed to be: two-sided 1e-6.
 const Z: f64 = 4.9;
 
 /// Both traversals.
 const BOTH: [BackendChoice; 2] = [BackendChoice::Bvh, BackendChoice::RayQuery];
-
-/// A solid of index `ior` with a smooth surface, filled with `medium`.
-fn glass(ior: f32, medium: Medium) -> Material {
-    Material {
-        name: String::from("glass"),
-        metallic: 0.0,
-        roughness: 0.0,
-        transmission: 1.0,
-        ior,
-        volume: Some(Volume {
-            medium,
-            priority: 0,
-        }),
-        ..Material::default()
-    }
-}
-
-/// A smooth sheet without thickness.
-fn sheet(ior: f32) -> Material {
-    Material {
-        volume: None,
-        ..glass(ior, Medium::default())
-    }
-}
-
-/// The same absorption and scattering in all channels, 1/m.
-fn grey(absorption: f32, scattering: f32, phase: Phase) -> Medium {
-    Medium {
-        absorption: Vec3::splat(absorption),
-        scattering: Vec3::splat(scattering),
-        phase,
-    }
-}
-
-/// A closed box with its fronts outside.
-fn block(low: Vec3, high: Vec3) -> Mesh {
-    let mut mesh = room(1.0);
-    for p in &mut mesh.positions {
-        *p = 0.5 * (low + high) + 0.5 * (high - low) * *p;
-    }
-    for t in &mut mesh.triangles {
-        t.swap(1, 2);
-    }
-    mesh
-}
 
 /// Parallel rays that meet the plane z = 0 at `degrees` from +z, over a square of 2 · half metres about its origin.
 fn oblique(degrees: f64, half: f64) -> etendue::scene::Camera {
@@ -109,16 +66,4 @@ fn assert_channels(what: &str, film: &Film, truth: [f64; 3], delta: f64) {
             "{what}, channel {channel}: {mean} instead of {truth}"
         );
     }
-}
-
-/// Power reflectance of a smooth interface for unpolarised light, textbook form in f64.
-fn fresnel(cos_i: f64, n: f64) -> f64 {
-    let sin2 = (1.0 - cos_i * cos_i) / (n * n);
-    if sin2 >= 1.0 {
-        return 1.0;
-    }
-    let cos_t = (1.0 - sin2).sqrt();
-    let s = (cos_i - n * cos_t) / (cos_i + n * cos_t);
-    let p = (n * cos_i - cos_t) / (n * cos_i + cos_t);
-    0.5 * (s * s + p * p)
 }

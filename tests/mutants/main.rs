@@ -9,6 +9,13 @@
     reason = "tests may unwrap; they print how far they are"
 )]
 
+#[path = "../common/named.rs"]
+#[cfg_attr(
+    not(feature = "mutants"),
+    expect(dead_code, reason = "without mutants nothing is run")
+)]
+mod named;
+
 mod estimator;
 mod light;
 mod matter;
@@ -20,7 +27,8 @@ mod run;
 mod shaders;
 
 use std::collections::BTreeSet;
-use std::path::{Path, PathBuf};
+
+use named::{has_test, root};
 
 /// One error.
 pub struct Mutant {
@@ -47,10 +55,6 @@ fn mutants() -> impl Iterator<Item = &'static Mutant> {
         .chain(estimator::MUTANTS)
 }
 
-fn root() -> PathBuf {
-    PathBuf::from(env!("CARGO_MANIFEST_DIR"))
-}
-
 /// The file with the error in it; an error where the list no longer fits.
 fn planted(mutant: &Mutant) -> Result<String, String> {
     let path = root().join(mutant.file);
@@ -67,29 +71,6 @@ fn planted(mutant: &Mutant) -> Result<String, String> {
         text = text.replace(from, to);
     }
     Ok(text)
-}
-
-/// All text below a folder, or of a file.
-fn text_below(path: &Path) -> String {
-    if !path.is_dir() {
-        return std::fs::read_to_string(path).unwrap_or_default();
-    }
-    let entries = path.read_dir().unwrap();
-    entries.map(|e| text_below(&e.unwrap().path())).collect()
-}
-
-/// Whether a test of this name is written down: its last word as a function, in the binary's folder.
-fn has_test(killer: &str) -> bool {
-    let (binary, name) = killer.split_once("::").unwrap();
-    let function = format!("fn {}()", name.rsplit("::").next().unwrap());
-    let places = match binary {
-        "etendue" => vec![root().join("src")],
-        _ => vec![
-            root().join("tests").join(binary),
-            root().join(format!("tests/{binary}.rs")),
-        ],
-    };
-    places.iter().any(|p| text_below(p).contains(&function))
 }
 
 #[test]

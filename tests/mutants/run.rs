@@ -6,88 +6,22 @@
 use std::collections::BTreeMap;
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
-use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
+use crate::named::{self, Outcome, binaries, root};
 use crate::shaders::{SHADERS, compile};
-use crate::{CONTROL, Mutant, mutants, page, planted, root};
+use crate::{CONTROL, Mutant, mutants, page, planted};
 
-/// A test that hangs has found something too.
+/// Of one test.
 const TIME_OUT: Duration = Duration::from_secs(600);
-
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Outcome {
-    Passed,
-    Failed,
-    Stuck,
-}
-
-/// Test binaries by name, built as this one was.
-fn binaries() -> BTreeMap<String, PathBuf> {
-    let cargo = std::env::var_os("CARGO").expect("run by cargo");
-    let arguments = "test --release --locked --features mutants --no-run --message-format=json";
-    let built = Command::new(cargo)
-        .args(arguments.split(' '))
-        .current_dir(root())
-        .stderr(Stdio::inherit())
-        .output()
-        .unwrap();
-    assert!(built.status.success(), "the tests do not build");
-    let mut found = BTreeMap::new();
-    for line in String::from_utf8(built.stdout).unwrap().lines() {
-        let Ok(message) = serde_json::from_str::<serde_json::Value>(line) else {
-            continue;
-        };
-        let name = message["target"]["name"].as_str();
-        let is_program = message["target"]["kind"][0] == "bin";
-        if let (Some(name), Some(path), false) = (name, message["executable"].as_str(), is_program)
-        {
-            found.insert(name.to_owned(), PathBuf::from(path));
-        }
-    }
-    found
-}
 
 /// Runs one test with the environment of a mutant.
 fn run(binaries: &BTreeMap<String, PathBuf>, test: &str, mutant: &str, spirv: &Path) -> Outcome {
-    let (binary, name) = test.split_once("::").unwrap();
-    let mut child = Command::new(&binaries[binary])
-        .args([name, "--exact", "--test-threads=1"])
-        .current_dir(root())
-        .env("ETENDUE_MUTANT", mutant)
-        .env("ETENDUE_MUTANT_SPIRV", spirv)
-        .env("ETENDUE_REQUIRE_DEVICE", "1")
-        .stdout(Stdio::piped())
-        .stderr(Stdio::null())
-        .spawn()
-        .unwrap();
-    let mut stdout = child.stdout.take().unwrap();
-    let reader = std::thread::spawn(move || {
-        let mut text = String::new();
-        std::io::Read::read_to_string(&mut stdout, &mut text).map(|_| text)
-    });
-    let started = Instant::now();
-    let status = loop {
-        if let Some(status) = child.try_wait().unwrap() {
-            break status;
-        }
-        if started.elapsed() > TIME_OUT {
-            child.kill().unwrap();
-            child.wait().unwrap();
-            return Outcome::Stuck;
-        }
-        std::thread::sleep(Duration::from_millis(20));
-    };
-    let text = reader.join().unwrap().unwrap_or_default();
-    assert!(
-        text.contains("running 1 test"),
-        "{test} is not a test: {text}"
-    );
-    if status.success() {
-        Outcome::Passed
-    } else {
-        Outcome::Failed
-    }
+    let environment = [
+        ("ETENDUE_MUTANT", mutant.as_ref()),
+        ("ETENDUE_MUTANT_SPIRV", spirv.as_os_str()),
+    ];
+    named::run(binaries, test, &environment, TIME_OUT).0
 }
 
 /// Whether a shader includes a file, by itself or through others, or is that file.
@@ -197,7 +131,7 @@ fn every_mutant_is_found_and_no_control() {
             .as_ref()
             .is_none_or(|names| names.split(',').any(|n| n == m.name))
     };
-    let binaries = binaries();
+    let binaries = binaries(&["mutants"]);
     let compiler = shaderc::Compiler::new().unwrap();
     let nothing = tempfile::tempdir().unwrap();
     let mut healthy = BTreeMap::new();

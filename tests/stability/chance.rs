@@ -1,0 +1,145 @@
+//! Random numbers as pictures see them: independent pixels and shards, long paths, sample numbers beyond 32 bits.
+
+use etendue::film::Film;
+use etendue::render::Tuning;
+use etendue::scene::{Phase, Scene};
+use etendue::settings::{Settings, Strategy};
+use glam::{DVec3, Vec3};
+
+use crate::common::*;
+use crate::solids::{block, glass, grey};
+use crate::support::{error_of, mean_of};
+use crate::tier::count;
+
+/// A plane under half a sky: every pixel has the same mean, and a variance of its own.
+fn noisy_plane() -> Scene {
+    let mut scene = empty();
+    add(&mut scene, square(Vec3::ZERO, Vec3::Z, 50.0), lambert(0.7));
+    let lamp = square(Vec3::new(0.0, 0.0, 3.0), Vec3::NEG_Z, 4.0);
+    add(&mut scene, lamp, emitter(0.0, 1.0));
+    scene.cameras = vec![parallel(DVec3::Z, DVec3::ZERO, 1e-3)];
+    scene
+}
+
+fn picture(scene: &Scene, side: u32, samples: std::ops::Range<u64>, seed: u64) -> Option<Film> {
+    let settings = Settings {
+        samples,
+        seed,
+        strategy: Strategy::BsdfOnly,
+        ..settings(side, 1)
+    };
+    Some(render(scene, &settings, Tuning::default())?.film)
+}
+
+/// Two-sided p of a normal deviate, by a bound that errs by a hundredth.
+fn is_likely(what: &str, z: f64) {
+    println!("{what}: {z:.2} standard deviations");
+    assert!(z.abs() <= 4.9, "{what}: {z}");
+}
+
+/// Variance of the means of tiles of 2, 4, 8 and 16 pixels a side: σ²/n if pixels are independent.
+#[test]
+fn tiles_have_the_variance_of_independent_pixels() {
+    const SIDE: usize = 128;
+    let Some(film) = picture(&noisy_plane(), SIDE as u32, 0..16, 5) else {
+        return;
+    };
+    let values: Vec<f64> = film.mean().iter().map(|m| f64::from(m[0])).collect();
+    let variance = |v: &[f64]| {
+        let mean = v.iter().sum::<f64>() / v.len() as f64;
+        v.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / (v.len() - 1) as f64
+    };
+    let single = variance(&values);
+    for tile in [2, 4, 8, 16] {
+        let across = SIDE / tile;
+        let mut means = vec![0.0; across * across];
+        for (i, v) in values.iter().enumerate() {
+            let (x, y) = (i % SIDE / tile, i / SIDE / tile);
+            means[y * across + x] += v / (tile * tile) as f64;
+        }
+        let ratio = variance(&means) * (tile * tile) as f64 / single;
+        // The variance of n nearly normal means has the relative deviation √(2/(n − 1)).
+        let z = (ratio - 1.0) / (2.0 / (means.len() - 1) as f64).sqrt();
+        is_likely(&format!("tiles of {tile}: variance × {ratio:.3}"), z);
+    }
+}
+
+/// The means of K shards scatter as their standard errors say, and the mean of all has a K-th of the variance.
+#[test]
+fn shards_have_the_variance_of_independent_samples() {
+    const SHARDS: u64 = 16;
+    let scene = noisy_plane();
+    let samples = 64;
+    let mut whole: Option<Film> = None;
+    let mut sum = 0.0;
+    let mut degrees = 0.0;
+    let mut means: Vec<Vec<f64>> = Vec::new();
+    for k in 0..SHARDS {
+        let Some(film) = picture(&scene, 32, samples * k..samples * (k + 1), 9) else {
+            return;
+        };
+        means.push(film.mean().iter().map(|m| f64::from(m[0])).collect());
+        match &mut whole {
+            None => whole = Some(film),
+            Some(all) => all.merge(film).unwrap(),
+        }
+    }
+    let error = whole.unwrap().standard_error();
+    for (pixel, error) in error.iter().enumerate() {
+        let variance = f64::from(error[0]).powi(2) * SHARDS as f64;
+        let mean = means.iter().map(|m| m[pixel]).sum::<f64>() / SHARDS as f64;
+        // F of means of shards over samples, summed over the pixels.
+        sum += means.iter().map(|m| (m[pixel] - mean).powi(2)).sum::<f64>() / variance;
+        degrees += (SHARDS - 1) as f64;
+    }
+    let z = (sum - degrees) / (2.0 * degrees).sqrt();
+    is_likely(
+        &format!("16 shards: F {:.4} of {degrees} degrees", sum / degrees),
+        z,
+    );
+}
+
+/// Paths of more than a thousand events keep drawing new numbers: a white cloud of optical depth 100 is still 1.
+#[test]
+fn long_paths_do_not_run_out_of_numbers() {
+    let mut scene = empty();
+    let half = Vec3::splat(0.5);
+    add(
+        &mut scene,
+        block(-half, half),
+        glass(1.0, grey(0.0, 100.0, Phase::Isotropic)),
+    );
+    scene.environment = constant_sky(1.0);
+    // From the middle: (τ/2)² · 3/2 events, about.
+    scene.cameras = vec![pinhole(DVec3::ZERO, DVec3::Z, 90.0)];
+    let Some(r) = render(&scene, &settings(16, count(64, 1024)), Tuning::default()) else {
+        return;
+    };
+    let (off, bound) = ((mean_of(&r.film) - 1.0).abs(), 4.9 * error_of(&r.film));
+    let events = r.report.rays as f64 / r.report.paths as f64;
+    println!("{events:.0} rays a path: off by {off:.1e} ± {bound:.1e}");
+    assert!(events > 1000.0);
+    assert!(off + bound <= 5e-2);
+}
+
+/// Samples on both sides of 2³² are as good as the first ones, and other ones.
+#[test]
+fn sample_numbers_pass_two_to_the_32() {
+    let scene = noisy_plane();
+    let around = 1u64 << 32;
+    let mut means = Vec::new();
+    for first in [0, around - 32, around, (1 << 40) - 32] {
+        let Some(film) = picture(&scene, 32, first..first + 64, 3) else {
+            return;
+        };
+        means.push((mean_of(&film), error_of(&film)));
+    }
+    for (i, (b, eb)) in means.iter().enumerate().skip(1) {
+        let (a, ea) = means[0];
+        assert_ne!(a, *b);
+        is_likely(
+            &format!("range {i} against the first"),
+            (b - a) / ea.hypot(*eb),
+        );
+    }
+}

@@ -1,0 +1,90 @@
+//! What the cases share.
+
+use etendue::Error;
+use etendue::film::Film;
+use etendue::layout::{NONE, ProbeRay};
+use etendue::render::{DeviceOptions, Renderer, Tuning};
+use etendue::scene::Scene;
+use etendue::settings::{BackendChoice, Settings};
+use glam::{DVec3, Vec3};
+
+/// The two intersection tests.
+pub const BOTH: [BackendChoice; 2] = [BackendChoice::Bvh, BackendChoice::RayQuery];
+
+/// SplitMix64: a fixed sequence for a seed.
+pub struct Random(pub u64);
+
+impl Random {
+    pub fn bits(&mut self) -> u64 {
+        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let mut z = self.0;
+        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        z ^ (z >> 31)
+    }
+
+    /// Uniform in [0, 1).
+    pub fn unit(&mut self) -> f64 {
+        (self.bits() >> 11) as f64 / (1u64 << 53) as f64
+    }
+
+    /// Uniform in [−1, 1]³.
+    pub fn cube(&mut self) -> DVec3 {
+        DVec3::from([(); 3].map(|()| 2.0 * self.unit() - 1.0))
+    }
+}
+
+/// Mean over pixels and channels.
+pub fn mean_of(film: &Film) -> f64 {
+    let values: f64 = film.mean().iter().flatten().map(|v| f64::from(*v)).sum();
+    values / (3 * film.pixels()) as f64
+}
+
+/// Its standard error; the channels of a pixel are taken as one.
+pub fn error_of(film: &Film) -> f64 {
+    let variance: f64 = film
+        .standard_error()
+        .iter()
+        .map(|e| f64::from(e[0].max(e[1]).max(e[2])).powi(2))
+        .sum();
+    variance.sqrt() / film.pixels() as f64
+}
+
+/// Largest difference of pixels, relative to the brighter one or to a hundredth of the mean.
+pub fn largest_difference(a: &Film, b: &Film) -> f64 {
+    let floor = 0.01 * mean_of(b);
+    a.mean()
+        .iter()
+        .flatten()
+        .zip(b.mean().iter().flatten())
+        .map(|(x, y)| (f64::from(*x), f64::from(*y)))
+        .map(|(x, y)| (x - y).abs() / x.max(y).max(floor).max(1e-300))
+        .fold(0.0, f64::max)
+}
+
+/// A renderer under validation, or the error that it makes; `None` with a printed reason without a device.
+pub fn open(scene: &Scene, settings: &Settings, tuning: Tuning) -> Option<Result<Renderer, Error>> {
+    let options = DeviceOptions {
+        device: None,
+        validation: true,
+    };
+    let required = std::env::var_os("ETENDUE_REQUIRE_DEVICE").is_some_and(|value| value == "1");
+    match Renderer::tuned(scene, settings, &options, tuning) {
+        Err(error @ Error::Unsupported { .. }) if !required => {
+            println!("skipped: {error}");
+            None
+        }
+        other => Some(other),
+    }
+}
+
+/// A ray without bounds.
+pub fn ray(origin: Vec3, direction: Vec3) -> ProbeRay {
+    ProbeRay {
+        origin: origin.to_array(),
+        t_min: 0.0,
+        direction: direction.to_array(),
+        t_max: 3e38,
+        from: NONE,
+    }
+}
