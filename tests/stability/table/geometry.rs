@@ -9,7 +9,9 @@ pub const CASES: &[Case] = &[
         id: "A1",
         what: "Self-intersection at coordinates of 1e6: an offset of 256 ulp is 16 units there",
         expected: "0 re-hits of spawned rays at scales 1e-6 … 1e6 (1e7 at night)",
-        verdict: Holds,
+        verdict: Wider(
+            "1.7e6 rays of fixed solids and 1e5 of random ones in the gate; 1e7 has not been run yet",
+        ),
         evidence: &[
             line(
                 "traversal::furnace::convex_solids_do_not_meet_themselves",
@@ -70,14 +72,14 @@ pub const CASES: &[Case] = &[
         what: "Edges and vertices leak: naive tests miss 5 % of rays at shared edges",
         expected: "0 misses of 1e7 rays for each intersection test",
         verdict: Misses(
-            "our own tree loses none; of rays aimed at edges to the bit lavapipe's ray query loses 6.5e-3 (Vulkan recommends watertightness and does not promise it; `selftest` measures it on each device)",
+            "our own tree loses none; of rays aimed at edges to the bit lavapipe's ray query loses 6.5e-3 (the last number is the sum) (Vulkan recommends watertightness and does not promise it; `selftest` measures it on each device)",
         ),
         evidence: &[
             passes("etendue::bvh::watertight::no_gaps_at_edges_and_vertices_in_ten_million_rays"),
-            line("traversal::watertight::closed_meshes_have_no_gaps", "bvh: "),
-            line(
+            largest("traversal::watertight::closed_meshes_have_no_gaps", "bvh:"),
+            largest(
                 "traversal::watertight::closed_meshes_have_no_gaps",
-                "ray-query: ",
+                "ray-query:",
             ),
         ],
     },
@@ -218,7 +220,7 @@ pub const CASES: &[Case] = &[
         id: "A16",
         what: "Negative scale turns facing around",
         expected: "mirrored glass = glass, copied and as an instance, within 0.5 %",
-        verdict: Holds,
+        verdict: Wider("0.5 %, with chance, instead of the same bits"),
         evidence: &[
             passes("loader::world::hierarchy_mirrors_and_shares_meshes"),
             largest("stability::placement::mirrored_glass_is_glass", "off"),
@@ -300,7 +302,7 @@ pub const CASES: &[Case] = &[
         id: "A23",
         what: "A ray leaves a medium through a skipped face and wanders for ever",
         expected: "paths that are trapped in glass: none of 1e8 segments (at night) gets out",
-        verdict: Holds,
+        verdict: Wider("2e6 segments for each intersection test; 1e8 has not been run yet"),
         evidence: &[
             passes("matter::cube::glass_cube_may_have_any_size_and_place"),
             line("stability::scales::paths_in_glass_keep_their_side", "Bvh"),

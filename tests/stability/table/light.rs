@@ -290,7 +290,7 @@ pub const LIGHTS: &[Case] = &[
         id: "F4",
         what: "Tiny lamps (1e-8)",
         expected: "size 1e-8 … 1e-2 at constant power: E constant within 0.1 %",
-        verdict: Holds,
+        verdict: Wider("lamps of 1e-8 to 1e-2 m; larger ones are no points"),
         evidence: &[largest(
             "stability::light::tiny_lamps_keep_their_power",
             "off by",
@@ -312,9 +312,8 @@ pub const LIGHTS: &[Case] = &[
         expected: "closed form of the reconstruction; the strategies agree",
         verdict: Holds,
         evidence: &[
-            largest(
+            passes(
                 "integrator::analytic::single_bright_texel_lights_a_plane_by_its_reconstruction",
-                "off ",
             ),
             line(
                 "integrator::strategies::sun_in_a_map_behind_an_occluder",
@@ -346,7 +345,7 @@ pub const LIGHTS: &[Case] = &[
         id: "F8",
         what: "Many lamps, lamps without power",
         expected: "1e4 (at night 1e5) lamps, half of them dark: E right within 3 %",
-        verdict: Holds,
+        verdict: Wider("1e4 lamps within 3 %, with chance"),
         evidence: &[
             line(
                 "shading::lights::lights_are_chosen_as_often_as_their_table_says",
