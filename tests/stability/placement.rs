@@ -14,12 +14,12 @@ use crate::support::{BOTH, Random, error_of, largest_difference, mean_of, open, 
 use crate::tier::{count, is_night};
 
 /// Keeps groups of their own for meshes that are placed twice.
-const TWO_LEVELS: Tuning = Tuning {
-    copy_limit: 0,
-    max_pass: 1 << 10,
-    max_tiles: u32::MAX,
-    everything: false,
-};
+fn two_levels() -> Tuning {
+    Tuning {
+        copy_limit: 0,
+        ..Tuning::default()
+    }
+}
 
 /// Two squares, each an instance under its own rotation, meet in an edge.
 #[test]
@@ -47,7 +47,7 @@ fn edges_between_instances_leak_little() {
             backend,
             ..settings(8, 1)
         };
-        let Some(renderer) = open(&scene, &settings, TWO_LEVELS) else {
+        let Some(renderer) = open(&scene, &settings, two_levels()) else {
             return;
         };
         let hits = renderer.unwrap().probe(&rays).unwrap();
@@ -89,7 +89,7 @@ fn mirrored_glass_is_glass() {
         let Some(plain) = picture(1.0, Tuning::default()) else {
             return;
         };
-        for (how, tuning) in [("copied", Tuning::default()), ("placed", TWO_LEVELS)] {
+        for (how, tuning) in [("copied", Tuning::default()), ("placed", two_levels())] {
             let mirrored = picture(-1.0, tuning).unwrap();
             let (a, b) = (mean_of(&plain.film), mean_of(&mirrored.film));
             let (off, bound) = ((b / a - 1.0).abs(), 4.9 * 1.4 * error_of(&plain.film) / a);
@@ -127,7 +127,7 @@ fn stretched_lamps_are_what_they_look_like() {
         let mut copy = placed.instances[1].clone();
         copy.world_from_object.translation = DVec3::new(0.0, -50.0, 0.0);
         placed.instances.push(copy);
-        let Some(placed) = render(&placed, &settings, TWO_LEVELS) else {
+        let Some(placed) = render(&placed, &settings, two_levels()) else {
             return;
         };
         let mut baked = room();
