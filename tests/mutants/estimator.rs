@@ -130,6 +130,16 @@ pub const MUTANTS: &[Mutant] = &[
         killers: &["integrator::emission::standard_error_is_that_of_the_samples"],
     },
     Mutant {
+        name: "blocks-as-samples",
+        wrong: "deviations within a net count as those of independent samples",
+        file: "shaders/film.glsl",
+        edits: &[(
+            "        within = vec3(0.0);",
+            "        within += vec3(0.0);",
+        )],
+        killers: &["integrator::calibration::intervals_hold_the_truth_as_often_as_they_say"],
+    },
+    Mutant {
         name: "sample-zero-twice",
         wrong: "the first sample is counted twice and the second never",
         file: "shaders/kernel_path.glsl",

@@ -18,8 +18,8 @@ pub const MUTANTS: &[Mutant] = &[
         wrong: "light's density without the emitter's cosθ (the seed's 6)",
         file: "shaders/lights.glsl",
         edits: &[(
-            "s.pdf = params.table_choice * density * distance2 / abs(cosine);",
-            "s.pdf = params.table_choice * density * distance2;",
+            "s.pdf = choice * density * distance2 / abs(cosine);",
+            "s.pdf = choice * density * distance2;",
         )],
         killers: &["shading::lights::emissive_triangles_are_sampled_by_area"],
     },
@@ -28,8 +28,8 @@ pub const MUTANTS: &[Mutant] = &[
         wrong: "the same, where scattering found the emitter",
         file: "shaders/lights.glsl",
         edits: &[(
-            "? params.table_choice * pdf_area * distance2 / cosine : 0.0;",
-            "? params.table_choice * pdf_area * distance2 : 0.0;",
+            "? pdf_area * distance2 / cosine : 0.0;",
+            "? pdf_area * distance2 : 0.0;",
         )],
         killers: &["integrator::strategies::lambert_room_with_a_quad_light"],
     },
@@ -310,11 +310,28 @@ pub const MUTANTS: &[Mutant] = &[
         name: "light-choice",
         wrong: "the density leaves out the choice of the light",
         file: "shaders/lights.glsl",
-        edits: &[(
-            "s.pdf = params.table_choice * light.choice;",
-            "s.pdf = params.table_choice;",
-        )],
+        edits: &[("s.pdf = choice * light.choice;", "s.pdf = choice;")],
         killers: &["shading::lights::lights_are_chosen_as_often_as_their_table_says"],
+    },
+    Mutant {
+        name: "cluster-choice",
+        wrong: "the density leaves out the way through the tree of lights",
+        file: "shaders/lights.glsl",
+        edits: &[(
+            "probability *= params.tree_choice;",
+            "probability = params.tree_choice;",
+        )],
+        killers: &["integrator::lamps::points_of_light_add_up"],
+    },
+    Mutant {
+        name: "cluster-way",
+        wrong: "the same, where scattering found the emitter",
+        file: "shaders/light_tree.glsl",
+        edits: &[(
+            "(is_right ? importance.y : importance.x) / sum : 0.0;",
+            "0.5 : 0.0;",
+        )],
+        killers: &["integrator::lamps::lamps_of_many_shapes"],
     },
     Mutant {
         name: "environment-choice",
