@@ -2,7 +2,7 @@
 //! it. Nothing of it is there without the feature `faults`, which only tests/faults uses.
 
 #[cfg(feature = "faults")]
-pub use armed::{Kind, Manner, Plan, arm, arm_from_environment, disarm};
+pub use armed::{Kind, Manner, Plan, arm, arm_from_environment, disarm, struck};
 
 #[cfg(feature = "faults")]
 pub(crate) use armed::{is_armed, strikes};
@@ -39,6 +39,7 @@ pub(crate) const fn give(_plan: NoPlan) {}
 #[cfg(feature = "faults")]
 mod armed {
     use std::cell::RefCell;
+    use std::time::Instant;
 
     /// What fails.
     #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -74,6 +75,7 @@ mod armed {
     pub(crate) struct State {
         plan: Plan,
         calls: Vec<&'static str>,
+        struck: Option<Instant>,
     }
 
     // Of each thread, so that tests beside each other do not meet.
@@ -83,13 +85,21 @@ mod armed {
 
     /// From now on calls of this thread are counted, and the planned one fails.
     pub fn arm(plan: Plan) {
-        let calls = Vec::new();
-        STATE.set(Some(State { plan, calls }));
+        STATE.set(Some(State {
+            plan,
+            calls: Vec::new(),
+            struck: None,
+        }));
     }
 
     /// No more faults; the names of the calls of the planned kind so far.
     pub fn disarm() -> Vec<&'static str> {
         STATE.take().map_or(Vec::new(), |state| state.calls)
+    }
+
+    /// When a call last failed on purpose.
+    pub fn struck() -> Option<Instant> {
+        STATE.with_borrow(|state| state.as_ref()?.struck)
     }
 
     /// As [`arm`], for programs: `ETENDUE_FAULT` is `vulkan` or `file`, the number of
@@ -133,7 +143,11 @@ mod armed {
             let (count, plan) = (state.calls.len() as u64, state.plan);
             let is_now = count == plan.at;
             let is_still = plan.at > 0 && count > plan.at && plan.manner != Manner::Once;
-            (is_now || is_still).then_some(plan.manner)
+            if !(is_now || is_still) {
+                return None;
+            }
+            state.struck = Some(Instant::now());
+            Some(plan.manner)
         })
     }
 }
