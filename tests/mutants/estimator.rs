@@ -124,8 +124,8 @@ pub const MUTANTS: &[Mutant] = &[
         wrong: "the deviations of two halves leave out their difference",
         file: "shaders/film.glsl",
         edits: &[(
-            "precise vec3 m2 = (a.m2 + b.m2) + (d * d) * (1.0 / (2.0 * count));",
-            "precise vec3 m2 = (a.m2 + b.m2) + 0.0 * d * count;",
+            "precise vec3 m2 = within + (d * d) * (1.0 / (2.0 * count));",
+            "precise vec3 m2 = within + 0.0 * d * count;",
         )],
         killers: &["integrator::emission::standard_error_is_that_of_the_samples"],
     },
