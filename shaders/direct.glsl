@@ -154,9 +154,10 @@ DirectLight direct_in_medium(Medium medium, Flight flight, vec4 u)
 // The same for a distance that is drawn by the angle at which a light sees the segment, for throughput one at its origin.
 DirectLight direct_along(Medium medium, Flight flight, vec4 u, float u_distance)
 {
-    // The same numbers choose the same point of the same light from anywhere.
+    // The same numbers are the same point of the light from anywhere.
     DirectLight direct;
-    direct.light = light_sample(flight.origin, direct_view(flight), u);
+    LightChoice choice = light_choose(direct_view(flight), u);
+    direct.light = light_from(choice, flight.origin, u);
     direct.value = vec3(0.0);
     direct.at = flight.origin;
     if (direct.light.is_infinite) {
@@ -166,7 +167,7 @@ DirectLight direct_along(Medium medium, Flight flight, vec4 u, float u_distance)
     float distance = equiangular_sample(e, flight.end, u_distance);
     float pdf = equiangular_pdf(e, distance);
     direct.at = flight.origin + distance * flight.direction;
-    direct.light = light_sample(direct.at, direct_view(flight), u);
+    direct.light = light_from(choice, direct.at, u);
     float phase = phase_value(medium, flight.direction, direct.light.wi);
     // 1/w = 1 + (density by distance / density by angle)² / w_direction, as in direct_in_medium.
     float weight = direct_light_weight(direct.light.is_delta, direct.light.pdf, phase);

@@ -106,23 +106,25 @@ LightSample light_sample_punctual(Light light, vec3 from, float choice)
     return s;
 }
 
-// A light for the point `from`, chosen for the view. pdf 0 stands for "none this time". For one
-// view the same u stands for the same point of the same light whatever `from` is.
-LightSample light_sample(vec3 from, LightView view, vec4 u)
+// An emitter that was chosen for a view.
+struct LightChoice {
+    float probability; // of the list that holds it; 0: none this time
+    bool is_environment;
+    float u;           // uniform, for the environment
+    Light light;
+};
+
+LightChoice light_choose(LightView view, vec4 u)
 {
-    LightSample s;
-    s.pdf = 0.0;
-    s.is_infinite = true;
+    LightChoice c;
+    c.probability = 0.0;
+    c.is_environment = false;
     float choice = u.x;
     if (HAS_ENVIRONMENT) {
         if (choice < params.env_choice) {
-            EnvironmentSample e = environment_sample(vec3(choice / params.env_choice, u.yz), u.w);
-            s.wi = e.wi;
-            s.is_infinite = true;
-            s.is_delta = false;
-            s.radiance = e.radiance;
-            s.pdf = e.pdf;
-            return s;
+            c.is_environment = true;
+            c.u = choice / params.env_choice;
+            return c;
         }
         choice -= params.env_choice;
     }
@@ -134,7 +136,7 @@ LightSample light_sample(vec3 from, LightView view, vec4 u)
             choice /= params.tree_choice;
             uint leaf = light_descend(view, choice, probability);
             if (probability == 0.0) {
-                return s;
+                return c;
             }
             probability *= params.tree_choice;
             index = leaf & LIGHT_LEAF_FIRST_MASK;
@@ -145,16 +147,45 @@ LightSample light_sample(vec3 from, LightView view, vec4 u)
     } else if (HAS_ENVIRONMENT) {
         choice /= params.table_choice;
     }
-    if ((!HAS_AREA_LIGHTS && !HAS_PUNCTUAL) || count == 0u) {
+    if (!HAS_AREA_LIGHTS && !HAS_PUNCTUAL) {
+        return c;
+    }
+    // An empty list reads zeros, which are a light without density.
+    index += min(uint(choice * float(count)), max(count, 1u) - 1u);
+    uvec4 entry = texelFetch(lights, int(LIGHT_TEXELS * index));
+    c.light = scene_light(u.w < uintBitsToFloat(entry.z) ? index : entry.y);
+    c.probability = probability;
+    return c;
+}
+
+// The chosen light for the point `from`. pdf 0 stands for "none this time". The same u stands
+// for the same point of the light whatever `from` is.
+LightSample light_from(LightChoice c, vec3 from, vec4 u)
+{
+    LightSample s;
+    s.pdf = 0.0;
+    s.is_infinite = true;
+    if (HAS_ENVIRONMENT && c.is_environment) {
+        EnvironmentSample e = environment_sample(vec3(c.u, u.yz), u.w);
+        s.wi = e.wi;
+        s.is_delta = false;
+        s.radiance = e.radiance;
+        s.pdf = e.pdf;
         return s;
     }
-    index += min(uint(choice * float(count)), count - 1u);
-    uvec4 entry = texelFetch(lights, int(LIGHT_TEXELS * index));
-    Light light = scene_light(u.w < uintBitsToFloat(entry.z) ? index : entry.y);
-    if (HAS_AREA_LIGHTS && (!HAS_PUNCTUAL || light.kind == LIGHT_TRIANGLE)) {
-        return light_sample_triangle(light, from, u.yz, probability);
+    if ((!HAS_AREA_LIGHTS && !HAS_PUNCTUAL) || (HAS_LIGHT_TREE && c.probability == 0.0)) {
+        return s;
     }
-    return light_sample_punctual(light, from, probability);
+    if (HAS_AREA_LIGHTS && (!HAS_PUNCTUAL || c.light.kind == LIGHT_TRIANGLE)) {
+        return light_sample_triangle(c.light, from, u.yz, c.probability);
+    }
+    return light_sample_punctual(c.light, from, c.probability);
+}
+
+// A light for the point `from`, chosen for the view.
+LightSample light_sample(vec3 from, LightView view, vec4 u)
+{
+    return light_from(light_choose(view, u), from, u);
 }
 
 #endif
