@@ -10,8 +10,8 @@ use crate::settings::{Estimator, Settings};
 use crate::spec;
 
 /// Shares of direct light that the environment map gets at least and at most
-/// beside other lights: neither may starve.
-const ENV_CHOICE: (f64, f64) = (0.1, 0.9);
+/// beside other lights, and distant lights beside the tree: none may starve.
+const SHARE: (f64, f64) = (0.1, 0.9);
 
 impl SceneData {
     /// Fills the light table and the tree; `emissions` is the mean emission of each material, `env_power`
@@ -42,6 +42,10 @@ impl SceneData {
         } else {
             emitters.iter().map(|e| e.power).sum()
         };
+        // Between 0 and 1 they fit single precision, however bright and large lamps are.
+        for emitter in &mut emitters {
+            emitter.power /= total;
+        }
         let is_distant = |e: &Emitter| e.light.kind == layout::LIGHT_DIRECTIONAL;
         let (distant, placed): (Vec<_>, Vec<_>) = emitters.into_iter().partition(is_distant);
         self.spec.light_tree = !is_uniform && light_tree::is_needed(&placed);
@@ -49,7 +53,6 @@ impl SceneData {
             if *emission > 0.0 && count > 0 {
                 // Power of a unit area, as in `emissive_triangles`.
                 let power = std::f64::consts::PI * emission * sides(record.flags);
-                let total = if self.spec.light_tree { 1.0 } else { total };
                 record.emission_pdf = (power / total) as f32;
                 record.flags |= layout::MATERIAL_EMISSIVE;
             }
@@ -58,12 +61,17 @@ impl SceneData {
             (false, _) => 0.0,
             (true, 0) => 1.0,
             (true, _) if is_uniform => 1.0 / (count + 1) as f64,
-            (true, _) => (env_power / (env_power + total)).clamp(ENV_CHOICE.0, ENV_CHOICE.1),
+            (true, _) => (env_power / (env_power + total)).clamp(SHARE.0, SHARE.1),
         };
         self.params.env_choice = env_choice as f32;
         self.params.table_choice = 1.0 - self.params.env_choice;
         if self.spec.light_tree {
-            let share = distant.iter().map(|e| e.power).sum::<f64>() / total;
+            let share = if distant.is_empty() {
+                0.0
+            } else {
+                let power: f64 = distant.iter().map(|e| e.power).sum();
+                power.clamp(SHARE.0, SHARE.1)
+            };
             self.params.tree_choice = self.params.table_choice * (1.0 - share) as f32;
             self.params.table_choice *= share as f32;
             self.add_table(distant, is_uniform);
@@ -71,6 +79,10 @@ impl SceneData {
         } else {
             let emitters = placed.into_iter().chain(distant).collect();
             self.add_table(emitters, is_uniform);
+        }
+        if self.lights.is_empty() {
+            // What kernels that were compiled for lights read without any.
+            self.lights = vec![[0; 4]; layout::LIGHT_TEXELS as usize];
         }
     }
 

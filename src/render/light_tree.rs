@@ -250,7 +250,7 @@ impl LightTree {
                 keep,
                 alias: first as u32 + alias,
                 choice: (weight / total) as f32,
-                // so far the power of a unit area
+                // so far the share of a unit area in all power
                 emission_pdf: (f64::from(light.emission_pdf) / total) as f32,
                 ..light
             });

@@ -16,7 +16,7 @@ use crate::scene::{LightKind, PunctualLight};
 pub(crate) struct Emitter {
     /// The record of the table, without the table's own fields.
     pub light: layout::Light,
-    /// Emitted power, up to one common factor; > 0.
+    /// Emitted power, up to one common factor, or its share of all; > 0.
     pub power: f64,
     /// Triangles: the placement of the group that has it.
     pub placement: u32,

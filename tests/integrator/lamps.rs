@@ -63,7 +63,29 @@ fn lamps_of_many_shapes() {
     }
 }
 
-/// As above within a medium that scatters, where lights are chosen for segments.
+/// Powers beyond single precision: the same picture, but for its unit.
+#[test]
+fn lamps_of_any_size_and_brightness() {
+    // Powers of two, so that nothing is rounded anew.
+    const SCALE: f64 = 134_217_728.0;
+    let gain = 2.0_f32.powi(76);
+    let settings = settings(16, 16);
+    let small = lamps();
+    let mut large = carried(lamps(), SCALE, DVec3::ZERO);
+    for material in &mut large.materials {
+        material.emission *= gain;
+    }
+    let film = |scene: &Scene| Some(render(scene, &settings, Tuning::default())?.film.mean());
+    let (Some(small), Some(large)) = (film(&small), film(&large)) else {
+        return;
+    };
+    let sum = |image: &[[f32; 3]]| image.iter().flatten().map(|&v| f64::from(v)).sum::<f64>();
+    let off = (sum(&large) / f64::from(gain) / sum(&small) - 1.0).abs();
+    println!("off by {off:.1e}");
+    assert!(off < 1e-6, "{off}");
+}
+
+/// The lamps within a medium that scatters, where lights are chosen for segments.
 #[test]
 fn lamps_in_fog() {
     let mut scene = lamps();
