@@ -96,24 +96,20 @@ impl Film {
     /// its degrees of freedom: whole blocks and the nodes that are smaller, or
     /// samples where there are not two whole blocks.
     pub fn parts(&self) -> u64 {
-        let parts = |level: u32| 1_u64 << level;
         if !self.has_blocks() {
             return self.samples();
         }
-        let nodes = self.nodes.values();
-        nodes
-            .map(|node| parts(node.level.saturating_sub(self.block_level)))
+        let levels = self.nodes.values().map(|node| node.level);
+        levels
+            .map(|level| 1_u64 << level.saturating_sub(self.block_level))
             .sum()
     }
 
     /// Whether there are two blocks to compare.
     fn has_blocks(&self) -> bool {
-        let nodes = self.nodes.values();
-        let whole = nodes.filter(|node| node.level >= self.block_level);
-        whole
-            .map(|node| 1_u64 << (node.level - self.block_level))
-            .sum::<u64>()
-            >= 2
+        let levels = self.nodes.values().map(|node| node.level);
+        let above = levels.filter_map(|level| level.checked_sub(self.block_level));
+        above.map(|level| 1_u64 << level).sum::<u64>() >= 2
     }
 
     /// The pixels that the film holds.

@@ -251,17 +251,10 @@ impl Renderer {
         let mut work = before;
         let start = Instant::now();
         let result = self.passes(&mut film, &mut work, samples, start, control);
-        self.report.times.render = before.seconds + start.elapsed().as_secs_f64();
-        self.report.paths = film.samples() * film.pixels() as u64;
-        (self.report.rays, self.report.ledger) = (work.rays, work.ledger);
+        let seconds = before.seconds + start.elapsed().as_secs_f64();
+        self.report.note(&film, &work, seconds);
         self.report.memory.film = self.backend.memory().film + film.bytes();
-        match result {
-            Ok(()) => Ok(film),
-            Err(error) => {
-                self.finished = Some((film, work));
-                Err(error)
-            }
-        }
+        keep_finished(&mut self.finished, result, film, work)
     }
 
     /// The complete passes of the last render, if it failed, and what they took.
@@ -396,6 +389,22 @@ impl Renderer {
     #[doc(hidden)]
     pub fn validation_messages(&self) -> Vec<String> {
         self.backend.validation_messages()
+    }
+}
+
+/// The film of a render, or its error; what was complete by then is kept.
+fn keep_finished(
+    finished: &mut Option<(Film, Work)>,
+    result: Result<()>,
+    film: Film,
+    work: Work,
+) -> Result<Film> {
+    match result {
+        Ok(()) => Ok(film),
+        Err(error) => {
+            *finished = Some((film, work));
+            Err(error)
+        }
     }
 }
 

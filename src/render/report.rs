@@ -152,6 +152,15 @@ pub struct Report {
     pub ledger: Ledger,
 }
 
+impl Report {
+    /// Takes down what a render of `seconds` came to.
+    pub(super) fn note(&mut self, film: &Film, work: &Work, seconds: f64) {
+        self.times.render = seconds;
+        self.paths = film.samples() * film.pixels() as u64;
+        (self.rays, self.ledger) = (work.rays, work.ledger);
+    }
+}
+
 /// A device and what it can run.
 #[derive(Clone, Debug)]
 pub struct DeviceInfo {

@@ -11,7 +11,9 @@ use std::thread;
 use std::time::{Duration, Instant};
 
 use super::passes::MAX_PASS_LEVEL;
-use super::{Control, DeviceOptions, Ledger, PASS_SECONDS, Progress, Renderer, Report, Work};
+use super::{
+    Control, DeviceOptions, Ledger, PASS_SECONDS, Progress, Renderer, Report, Work, keep_finished,
+};
 use crate::error::{Error, Result};
 use crate::fault;
 use crate::film::Film;
@@ -121,16 +123,8 @@ impl Team {
         let mut work = before;
         let start = Instant::now();
         let result = self.rounds(&mut film, &mut work, samples, start, control);
-        self.report.times.render = work.seconds;
-        self.report.paths = film.samples() * film.pixels() as u64;
-        (self.report.rays, self.report.ledger) = (work.rays, work.ledger);
-        match result {
-            Ok(()) => Ok(film),
-            Err(error) => {
-                self.finished = Some((film, work));
-                Err(error)
-            }
-        }
+        self.report.note(&film, &work, work.seconds);
+        keep_finished(&mut self.finished, result, film, work)
     }
 
     /// As [`Renderer::take_finished`].
