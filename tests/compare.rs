@@ -7,6 +7,9 @@
     reason = "tests may unwrap; they print measured figures and why they skip"
 )]
 
+#[path = "common/random.rs"]
+mod random;
+
 use std::path::Path;
 
 use etendue::Error;
@@ -16,6 +19,7 @@ use etendue::render::{Control, DeviceOptions, Renderer};
 use etendue::scene::{Scene, gltf};
 use etendue::settings::{BackendChoice, Crop, Settings};
 use glam::Vec4;
+use random::Random;
 
 /// Rates of false alarms that are looked at.
 const LEVELS: [f64; 2] = [0.01, 0.05];
@@ -42,33 +46,20 @@ fn assert_calibrated(what: &str, p: &[f64]) {
     }
 }
 
-/// Random numbers: SplitMix64.
-struct Random(u64);
-
-impl Random {
-    fn next(&mut self) -> f64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        ((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 53) as f64
-    }
-}
-
 /// What one sample of a pixel can be like.
 type Law = fn(&mut Random) -> f64;
 
 const LAWS: [(&str, Law); 6] = [
-    ("uniform", |r| r.next()),
+    ("uniform", |r| r.unit()),
     // as a camera ray at an edge, or a small lamp met by chance
-    ("binary", |r| f64::from(r.next() < 0.2)),
-    ("rare", |r| f64::from(r.next() < 1e-3)),
+    ("binary", |r| f64::from(r.unit() < 0.2)),
+    ("rare", |r| f64::from(r.unit() < 1e-3)),
     ("fireflies", |r| {
-        0.1 * r.next() + if r.next() < 1e-4 { 1000.0 } else { 0.0 }
+        0.1 * r.unit() + if r.unit() < 1e-4 { 1000.0 } else { 0.0 }
     }),
     // P(x > t) = t^−2.2: σ is finite, σ of σ is not
-    ("heavy tail", |r| (1.0 - r.next()).powf(-1.0 / 2.2) - 1.0),
-    ("no variance", |r| (1.0 - r.next()).powf(-1.0 / 1.2) - 1.0),
+    ("heavy tail", |r| (1.0 - r.unit()).powf(-1.0 / 2.2) - 1.0),
+    ("no variance", |r| (1.0 - r.unit()).powf(-1.0 / 1.2) - 1.0),
 ];
 
 /// An image of `side` × `side` pixels of `n` samples with the law.

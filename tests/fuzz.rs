@@ -12,6 +12,9 @@
 #[path = "loader/builder.rs"]
 #[expect(dead_code, reason = "tests/loader uses the rest")]
 mod builder;
+#[path = "common/random.rs"]
+#[expect(dead_code, reason = "no real numbers here")]
+mod random;
 #[path = "common/tier.rs"]
 mod tier;
 
@@ -26,6 +29,7 @@ use etendue::image_io::{Aov, Image, Metadata, read_exr, write_exr};
 use etendue::scene::gltf::{Limits, load_with};
 use etendue::scene::load_environment;
 use etendue::settings::Crop;
+use random::Random;
 use serde_json::json;
 use sha2::{Digest, Sha256};
 
@@ -34,18 +38,7 @@ const LONGEST: Duration = Duration::from_secs(5);
 /// Memory of this process, bytes.
 const MOST_MEMORY: u64 = 1 << 30;
 
-/// splitmix64.
-struct Random(u64);
-
 impl Random {
-    fn bits(&mut self) -> u64 {
-        self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
-        z ^ (z >> 31)
-    }
-
     fn below(&mut self, n: usize) -> usize {
         (self.bits() % n.max(1) as u64) as usize
     }

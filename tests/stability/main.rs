@@ -14,6 +14,8 @@
 mod common;
 #[path = "../common/named.rs"]
 mod named;
+#[path = "../common/random.rs"]
+mod random;
 #[path = "../common/solids.rs"]
 #[expect(dead_code, reason = "tests/matter uses the rest")]
 mod solids;

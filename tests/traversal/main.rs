@@ -10,6 +10,9 @@
     reason = "tests may unwrap, and they say why they skip and what they measured"
 )]
 
+#[path = "../common/random.rs"]
+mod random;
+
 mod brute;
 mod furnace;
 mod gap;
