@@ -1,14 +1,16 @@
 // Radiance from infinity: a constant, or a latitude–longitude map that is
-// reconstructed bilinearly and sampled by an alias table over its texels. The
-// table's weights are the means of the reconstruction over each texel, so that
-// no direction with light has density zero.
+// reconstructed bilinearly. Directions are sampled in proportion to a bilinear function too, whose values at
+// the centres of texels stand beside the radiance: a table chooses the cell between
+// four centres, and within it the warp is exact. So a sun of few texels has no noise of its own.
 //
 // [Vose91] Vose, A Linear Algorithm for Generating Random Numbers.
+// [PBRT4] Pharr, Jakob, Humphreys, Physically Based Rendering, 4th edition, §A.5.2 (bilinear functions).
 
 #ifndef ENVIRONMENT_GLSL
 #define ENVIRONMENT_GLSL
 
 #include "math.glsl"
+#include "sampling.glsl"
 #include "scene.glsl"
 
 struct EnvironmentSample {
@@ -26,32 +28,31 @@ vec2 environment_uv(vec3 d)
     return vec2(0.5 + atan(x, -z) / TWO_PI, atan(sqrt(x * x + z * z), d.y) * INV_PI);
 }
 
-vec3 environment_texel(int x, int y)
+// Radiance without its factor, and the density in (u, v) over 2π².
+vec4 environment_texel(int x, int y)
 {
     int width = int(params.env_width);
     x = x < 0 ? x + width : (x >= width ? x - width : x);
     y = clamp(y, 0, int(params.env_height) - 1);
-    return texelFetch(env_map, y * width + x).rgb;
+    return texelFetch(env_map, y * width + x);
 }
 
-// Texel that holds (u, v).
-uint environment_cell(vec2 uv)
-{
-    uint x = min(uint(uv.x * float(params.env_width)), params.env_width - 1u);
-    uint y = min(uint(uv.y * float(params.env_height)), params.env_height - 1u);
-    return y * params.env_width + x;
-}
-
-vec3 environment_lookup(vec2 uv)
+vec4 environment_lookup(vec2 uv)
 {
     vec2 at = uv * vec2(params.env_width, params.env_height) - 0.5;
     vec2 base = floor(at);
     vec2 f = at - base;
     int x = int(base.x);
     int y = int(base.y);
-    vec3 top = mix(environment_texel(x, y), environment_texel(x + 1, y), f.x);
-    vec3 bottom = mix(environment_texel(x, y + 1), environment_texel(x + 1, y + 1), f.x);
-    return params.env_radiance * mix(top, bottom, f.y);
+    vec4 top = mix(environment_texel(x, y), environment_texel(x + 1, y), f.x);
+    vec4 bottom = mix(environment_texel(x, y + 1), environment_texel(x + 1, y + 1), f.x);
+    return mix(top, bottom, f.y);
+}
+
+// Density per steradian, without the choice of the map, where (u, v) is sampled with `density` · 2π².
+float environment_pdf(float density, float sine)
+{
+    return density > 0.0 ? density / sine : 0.0;
 }
 
 // Radiance that arrives along −d, and the density with which direct light would have sampled d.
@@ -61,37 +62,45 @@ vec3 environment_radiance(vec3 d, out float pdf)
     if (!HAS_ENVIRONMENT) {
         return params.env_radiance;
     }
-    vec2 uv = environment_uv(d);
-    pdf = params.env_choice * env_table[environment_cell(uv)].pdf;
-    return environment_lookup(uv);
+    vec4 value = environment_lookup(environment_uv(d));
+    pdf = params.env_choice * environment_pdf(value.w, length(d.xz));
+    return params.env_radiance * value.rgb;
 }
 
-// A direction by the map's radiance. The pdf includes the choice of the map.
+// A direction by the map's density. The pdf includes the choice of the map.
 EnvironmentSample environment_sample(vec3 u, float coin)
 {
-    uint count = params.env_width * params.env_height;
+    // A row of cells between two rows of texels, and half a row at each pole.
+    int height = int(params.env_height);
+    uint count = params.env_width * (params.env_height + 1u);
     uint cell = min(uint(u.x * float(count)), count - 1u);
-    EnvTexel entry = env_table[cell];
-    if (coin >= entry.keep) {
-        cell = entry.alias;
-        entry = env_table[cell];
+    if (coin >= env_table[cell].keep) {
+        cell = env_table[cell].alias;
     }
-    uint row = cell / params.env_width;
-    uint column = cell - row * params.env_width;
-    // Uniform in solid angle within the texel: uniform in φ and in cosθ.
-    float theta0 = PI * float(row) / float(params.env_height);
-    float theta1 = PI * float(row + 1u) / float(params.env_height);
-    float y = mix(cos(theta0), cos(theta1), u.z);
-    float sine = sqrt(max(1.0 - y * y, 0.0));
-    vec2 uv = vec2((float(column) + u.y) / float(params.env_width), atan(sine, y) * INV_PI);
-    float phi = TWO_PI * (uv.x - 0.5);
-    float x = sine * sin(phi);
-    float z = -sine * cos(phi);
+    int row = int(cell / params.env_width);
+    int column = int(cell % params.env_width);
+    vec4 a = environment_texel(column, row - 1);
+    vec4 b = environment_texel(column + 1, row - 1);
+    vec4 c = environment_texel(column, row);
+    vec4 d = environment_texel(column + 1, row);
+    float y = sample_linear(u.z, a.w + b.w, c.w + d.w);
+    float x = sample_linear(u.y, mix(a.w, c.w, y), mix(b.w, d.w, y));
+    vec4 value = mix(mix(a, b, x), mix(c, d, x), y);
+
+    // In rows from the nearer pole, where angles are small and exact.
+    bool is_south = 2 * row > height;
+    float north = row == 0 ? 0.5 * y : float(row) - 0.5 + y;
+    float south = row == height ? 0.5 - 0.5 * y : float(height - row) + 0.5 - y;
+    float theta = PI * (is_south ? south : north) / float(height);
+    float sine = sin(theta);
+    float phi = TWO_PI * ((float(column) + 0.5 + x) / float(params.env_width) - 0.5);
+    float east = sine * sin(phi);
+    float back = -sine * cos(phi);
     EnvironmentSample s;
-    s.wi = normalize(vec3(params.env_cos_rotation * x + params.env_sin_rotation * z, y,
-                          params.env_cos_rotation * z - params.env_sin_rotation * x));
-    s.radiance = environment_lookup(uv);
-    s.pdf = params.env_choice * entry.pdf;
+    s.wi = normalize(vec3(params.env_cos_rotation * east + params.env_sin_rotation * back, is_south ? -cos(theta) : cos(theta),
+                          params.env_cos_rotation * back - params.env_sin_rotation * east));
+    s.radiance = params.env_radiance * value.rgb;
+    s.pdf = params.env_choice * environment_pdf(value.w, sine);
     return s;
 }
 

@@ -215,11 +215,10 @@ const uint LIGHT_PLAIN = 0x80000000u;        // `intensity` is all: no texture, 
 const uint LIGHT_DOUBLE_SIDED = 0x40000000u; // emits from both sides
 const uint LIGHT_MIRRORED = 0x20000000u;     // the front sees its corners clockwise
 
-// Environment map texel: alias table over all texels.
-struct EnvTexel {
+// Alias table over the cells between the centres of four texels of the environment map: env_height + 1 rows.
+struct EnvCell {
     float keep;
     uint alias;
-    float pdf;                  // per steradian
 };
 
 // --- Probe: rays in, hits out (tests, identity layers) -------------------------
@@ -283,7 +282,7 @@ const uint BIND_TEXTURE_USES = 8u;   // storage: TextureUse[]
 const uint BIND_TEXELS = 9u;         // texel buffer R32UI
 const uint BIND_LIGHTS = 10u;        // texel buffer RGBA32UI: Light[]
 const uint BIND_ENV_MAP = 11u;       // texel buffer RGBA32F
-const uint BIND_ENV_TABLE = 12u;     // storage: EnvTexel[]
+const uint BIND_ENV_TABLE = 12u;     // storage: EnvCell[]
 const uint BIND_SCENE = 13u;         // acceleration structure (ray query)
 const uint BIND_BVH_NODES = 14u;     // texel buffer RGBA32UI, five texels a node (own BVH)
 const uint BIND_BVH_TRIANGLES = 15u; // texel buffer RGBA32UI, three texels a triangle (own BVH)

@@ -21,6 +21,13 @@ vec2 sample_triangle(vec2 u)
     return vec2(r * (1.0 - u.y), r * u.y);
 }
 
+// A number in [0, 1] with a density that goes linearly from a to b, up to a factor.
+float sample_linear(float u, float a, float b)
+{
+    float divisor = a + sqrt(mix(a * a, b * b, u));
+    return divisor > 0.0 ? min(u * (a + b) / divisor, 1.0) : u;
+}
+
 // Weight of a sample drawn with density `mine` that another technique would have
 // drawn with density `other`. Written with the ratio, so that large densities do
 // not overflow. [Veach97] power heuristic, exponent 2.

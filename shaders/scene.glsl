@@ -10,7 +10,7 @@
 layout(binding = BIND_PARAMS, scalar) uniform ParamsBlock { Params params; };
 layout(binding = BIND_INSTANCES, scalar) readonly buffer InstancesBlock { Instance instances[]; };
 layout(binding = BIND_TEXTURE_USES, scalar) readonly buffer TextureUsesBlock { TextureUse texture_uses[]; };
-layout(binding = BIND_ENV_TABLE, scalar) readonly buffer EnvTableBlock { EnvTexel env_table[]; };
+layout(binding = BIND_ENV_TABLE, scalar) readonly buffer EnvTableBlock { EnvCell env_table[]; };
 
 // wgpu has no texel buffers; the same records then are storage buffers.
 #ifdef WGPU

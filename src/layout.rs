@@ -152,10 +152,9 @@ shared! {
         intensity: [f32; 3],
         emission_pdf: f32,
     }
-    EnvTexel {
+    EnvCell {
         keep: f32,
         alias: u32,
-        pdf: f32,
     }
     ProbeRay {
         origin: [f32; 3],

@@ -1,5 +1,5 @@
 //! Emitters as the kernels sample them: the alias table over emissive triangles
-//! and punctual lights, and the one over the texels of an environment map.
+//! and punctual lights.
 //!
 //! \[Vose91\] Vose, A Linear Algorithm for Generating Random Numbers with a Given
 //! Distribution, IEEE TSE 17(9).
@@ -9,7 +9,6 @@ use std::f64::consts::PI;
 use glam::Vec3;
 
 use crate::layout;
-use crate::mutant;
 use crate::scene::{LightKind, PunctualLight};
 
 /// One emitter with the power that decides how often it is sampled.
@@ -110,55 +109,6 @@ pub(crate) fn alias_table(weights: &[f64]) -> Vec<(f32, u32)> {
     table
 }
 
-/// Alias table over an environment map with the density of each texel, 1/sr, and
-/// the map's mean radiance; `None` for a black map.
-///
-/// The weight of a texel is the mean over its square of the bilinear
-/// reconstruction, times its solid angle: a direction with light always has a
-/// positive density, also beside a single bright texel.
-pub(crate) fn environment_table(
-    width: usize,
-    height: usize,
-    texels: &[[f32; 3]],
-) -> Option<(Vec<layout::EnvTexel>, f64)> {
-    // Mean of a tent over a texel: 1/8, 6/8, 1/8 in each axis.
-    let mean = |x: usize, y: usize| {
-        if mutant::is("environment-nearest") {
-            return sampling_weight(Vec3::from(texels[y * width + x]));
-        }
-        let columns = [(x + width - 1) % width, x, (x + 1) % width];
-        let rows = [y.saturating_sub(1), y, (y + 1).min(height - 1)];
-        let mut sum = 0.0;
-        for (row, wy) in rows.iter().zip([1.0, 6.0, 1.0]) {
-            for (column, wx) in columns.iter().zip([1.0, 6.0, 1.0]) {
-                sum += wx * wy * sampling_weight(Vec3::from(texels[row * width + column])) / 64.0;
-            }
-        }
-        sum
-    };
-    let solid_angle = |y: usize| {
-        let edge = |row: usize| (PI * row as f64 / height as f64).cos();
-        2.0 * PI / width as f64 * (edge(y) - edge(y + 1))
-    };
-    let weights: Vec<f64> = (0..width * height)
-        .map(|i| mean(i % width, i / width) * solid_angle(i / width))
-        .collect();
-    let total: f64 = weights.iter().sum();
-    if total <= 0.0 {
-        return None;
-    }
-    let table = alias_table(&weights)
-        .into_iter()
-        .enumerate()
-        .map(|(i, (keep, alias))| layout::EnvTexel {
-            keep,
-            alias,
-            pdf: (weights[i] / total / solid_angle(i / width)) as f32,
-        })
-        .collect();
-    Some((table, total / (4.0 * PI)))
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -176,30 +126,5 @@ mod tests {
             // The kept share is rounded to fp32: 6e-8 of an entry.
             assert!((p - w / 20.0).abs() < 1e-7, "{p} {w}");
         }
-    }
-
-    #[test]
-    fn environment_density_integrates_to_one_and_covers_light() {
-        let (width, height) = (16, 8);
-        let mut texels = vec![[0.0; 3]; width * height];
-        texels[3 * width + 5] = [100.0, 0.0, 0.0];
-        let (table, _) = environment_table(width, height, &texels).expect("the map is not black");
-        let total: f64 = (0..width * height)
-            .map(|i| {
-                let edge = |row: usize| (PI * row as f64 / height as f64).cos();
-                let row = i / width;
-                f64::from(table[i].pdf) * 2.0 * PI / width as f64 * (edge(row) - edge(row + 1))
-            })
-            .sum();
-        // Sixteen fp32 roundings.
-        assert!((total - 1.0).abs() < 1e-6, "{total}");
-        for (dy, dx) in [(0, 0), (0, 1), (1, 0), (1, 1)] {
-            assert!(table[(3 + dy) * width + 5 + dx].pdf > 0.0);
-        }
-    }
-
-    #[test]
-    fn black_environment_has_no_table() {
-        assert!(environment_table(2, 1, &[[0.0; 3]; 2]).is_none());
     }
 }

@@ -4,6 +4,7 @@
 
 mod backend;
 mod emitters;
+mod environment;
 pub mod geometry;
 mod light_tree;
 mod lights;

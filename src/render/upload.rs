@@ -3,6 +3,7 @@
 
 use glam::{DVec3, Vec3};
 
+use super::environment::SampledMap;
 use super::geometry::Geometry;
 use super::lights;
 use super::media;
@@ -12,7 +13,7 @@ use crate::layout;
 use crate::scene::{
     AlphaMode, Environment, Filter, Material, Scene, Texels, Texture, TextureRef, Wrap,
 };
-use crate::settings::Settings;
+use crate::settings::{Estimator, Settings, Strategy};
 use crate::spec::{self, Spec};
 
 /// Host copies of everything but the acceleration structures.
@@ -28,7 +29,7 @@ pub(crate) struct SceneData {
     /// The light table as texels, then the nodes and the keys of the tree.
     pub lights: Vec<[u32; 4]>,
     pub env_map: Vec<[f32; 4]>,
-    pub env_table: Vec<layout::EnvTexel>,
+    pub env_table: Vec<layout::EnvCell>,
 }
 
 impl SceneData {
@@ -65,14 +66,14 @@ impl SceneData {
             .map(|m| mean_emission(m, &scene.textures))
             .collect();
         data.add_materials(scene, &solids, &first_texels);
-        let env_power = data.add_environment(scene);
+        let env_power = data.add_environment(scene, settings);
         data.add_lights(scene, settings, &solids, &emissions, env_power);
         data
     }
 
     /// Bytes of textures and environment maps on the device.
     pub fn texture_bytes(&self) -> u64 {
-        (4 * self.texels.len() + 16 * self.env_map.len() + 12 * self.env_table.len()) as u64
+        (4 * self.texels.len() + 16 * self.env_map.len() + 8 * self.env_table.len()) as u64
     }
 
     /// Bytes of the lists that are neither geometry nor textures.
@@ -114,7 +115,7 @@ impl SceneData {
     }
 
     /// The map with its table; returns its power into the scene, or 0 where there is none.
-    fn add_environment(&mut self, scene: &Scene) -> f64 {
+    fn add_environment(&mut self, scene: &Scene, settings: &Settings) -> f64 {
         self.spec.environment = false;
         match &scene.environment {
             None => 0.0,
@@ -129,9 +130,10 @@ impl SceneData {
                 intensity,
                 rotation,
             }) => {
-                let Some((table, mean)) =
-                    lights::environment_table(*width as usize, *height as usize, texels)
-                else {
+                let size = [*width as usize, *height as usize];
+                let is_compensated =
+                    settings.estimator == Estimator::Full && settings.strategy == Strategy::Mis;
+                let Some(map) = SampledMap::new(size, texels, is_compensated) else {
                     return 0.0;
                 };
                 self.spec.environment = *intensity > 0.0;
@@ -140,10 +142,14 @@ impl SceneData {
                 self.params.env_height = *height;
                 self.params.env_cos_rotation = f64::from(*rotation).cos() as f32;
                 self.params.env_sin_rotation = f64::from(*rotation).sin() as f32;
-                self.env_map = texels.iter().map(|t| [t[0], t[1], t[2], 0.0]).collect();
-                self.env_table = table;
+                self.env_map = map.texels;
+                self.env_table = map.cells;
                 let radius = self.geometry.radius;
-                4.0 * std::f64::consts::PI.powi(2) * radius * radius * mean * f64::from(*intensity)
+                4.0 * std::f64::consts::PI.powi(2)
+                    * radius
+                    * radius
+                    * map.mean
+                    * f64::from(*intensity)
             }
         }
     }

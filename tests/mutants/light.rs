@@ -258,26 +258,18 @@ pub const MUTANTS: &[Mutant] = &[
         name: "environment-sine",
         wrong: "the environment's density without sinθ",
         file: "shaders/environment.glsl",
-        edits: &[
-            (
-                "s.pdf = params.env_choice * entry.pdf;",
-                "s.pdf = params.env_choice * entry.pdf * 0.5 * PI * sine;",
-            ),
-            (
-                "pdf = params.env_choice * env_table[environment_cell(uv)].pdf;",
-                "pdf = params.env_choice * env_table[environment_cell(uv)].pdf * 0.5 * PI * sin(PI * uv.y);",
-            ),
-        ],
+        edits: &[(
+            "density > 0.0 ? density / sine : 0.0;",
+            "density > 0.0 ? density * 0.5 * PI : 0.0;",
+        )],
         killers: &["shading::environment::directions_have_their_density"],
     },
     Mutant {
         name: "environment-nearest",
         wrong: "the environment's table does not know of the interpolation",
-        file: "src/render/lights.rs",
+        file: "src/render/environment.rs",
         edits: &[],
-        killers: &[
-            "etendue::render::lights::tests::environment_density_integrates_to_one_and_covers_light",
-        ],
+        killers: &["etendue::render::environment::tests::cells_hold_the_integral_of_the_density"],
     },
     Mutant {
         name: "environment-mirrored",
@@ -338,8 +330,8 @@ pub const MUTANTS: &[Mutant] = &[
         wrong: "the density leaves out the choice between map and lamps",
         file: "shaders/environment.glsl",
         edits: &[(
-            "s.pdf = params.env_choice * entry.pdf;",
-            "s.pdf = entry.pdf;",
+            "s.pdf = params.env_choice * environment_pdf(value.w, sine);",
+            "s.pdf = environment_pdf(value.w, sine);",
         )],
         killers: &[
             "shading::environment::directions_have_their_density",

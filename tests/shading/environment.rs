@@ -2,7 +2,7 @@
 
 use std::f64::consts::{PI, TAU};
 
-use etendue::layout::{EnvTexel, Params};
+use etendue::layout::{EnvCell, Params};
 use glam::DVec3;
 
 use crate::fixture::Rng;
@@ -16,16 +16,7 @@ const FACTOR: f64 = 2.5;
 const ROTATION: f64 = 0.7;
 const CHOICE: f64 = 0.75;
 
-/// Borders of the rows, cosines from the zenith down.
-fn edge(row: usize) -> f64 {
-    (PI * row as f64 / HEIGHT as f64).cos()
-}
-
-fn solid_angle(row: usize) -> f64 {
-    TAU / WIDTH as f64 * (edge(row) - edge(row + 1))
-}
-
-/// Densities of the texels (any will do for the sampler; some are 0) and the scene.
+/// Densities at the centres of the texels over 2π² (any will do for the sampler; some are 0), radiances and the scene.
 fn map() -> (Vec<f64>, Vec<[f64; 3]>, Scene) {
     let mut rng = Rng(11);
     let count = WIDTH * HEIGHT;
@@ -34,28 +25,27 @@ fn map() -> (Vec<f64>, Vec<[f64; 3]>, Scene) {
         let scale = if i == 53 { 300.0 } else { 1.0 };
         texels.push([0; 4].map(|_| scale * rng.uniform32()));
     }
-    let weights: Vec<f64> = (0..count)
+    let values: Vec<f64> = (0..count)
         .map(|i| {
             if i % 7 == 3 {
                 0.0
             } else {
-                f64::from(texels[i][0]).sqrt() * solid_angle(i / WIDTH)
+                f64::from(texels[i][0]).sqrt()
             }
         })
         .collect();
-    let total: f64 = weights.iter().sum();
-    let densities: Vec<f64> = (0..count)
-        .map(|i| weights[i] / total / solid_angle(i / WIDTH))
+    let cells: Vec<f64> = (0..WIDTH * (HEIGHT + 1))
+        .map(|cell| {
+            let (column, row) = (cell % WIDTH, cell / WIDTH);
+            let middle = [(column + 1) as f64 / WIDTH as f64, middle_of(row)];
+            bilinear(|i| values[i], middle) * height_of(row) / WIDTH as f64
+        })
         .collect();
-    let table = alias_table(&weights);
-    let env_table = table
-        .iter()
-        .zip(&densities)
-        .map(|(&(keep, alias), &pdf)| EnvTexel {
-            keep,
-            alias,
-            pdf: pdf as f32,
-        });
+    let total: f64 = cells.iter().sum();
+    let densities: Vec<f64> = values.iter().map(|v| v / total / (TAU * PI)).collect();
+    for (texel, density) in texels.iter_mut().zip(&densities) {
+        texel[3] = *density as f32;
+    }
     let scene = Scene {
         params: Params {
             env_radiance: [FACTOR as f32; 3],
@@ -66,7 +56,10 @@ fn map() -> (Vec<f64>, Vec<[f64; 3]>, Scene) {
             env_sin_rotation: ROTATION.sin() as f32,
             ..Params::default()
         },
-        env_table: env_table.collect(),
+        env_table: alias_table(&cells)
+            .iter()
+            .map(|&(keep, alias)| EnvCell { keep, alias })
+            .collect(),
         env_map: texels.clone(),
         has_environment: true,
         ..Scene::default()
@@ -78,6 +71,20 @@ fn map() -> (Vec<f64>, Vec<[f64; 3]>, Scene) {
     (densities, texels, scene)
 }
 
+/// Height of a row of cells in v, and its middle. Rows lie between those of texels; half a row is left at each pole.
+fn height_of(row: usize) -> f64 {
+    let share = if row == 0 || row == HEIGHT { 0.5 } else { 1.0 };
+    share / HEIGHT as f64
+}
+
+fn middle_of(row: usize) -> f64 {
+    match row {
+        0 => 0.25 / HEIGHT as f64,
+        HEIGHT => 1.0 - 0.25 / HEIGHT as f64,
+        _ => row as f64 / HEIGHT as f64,
+    }
+}
+
 /// What stood in direction d of the map stands at R_y(rotation)·d in the world.
 fn uv_of(world: DVec3) -> [f64; 2] {
     let d = glam::DQuat::from_rotation_y(-ROTATION) * world;
@@ -85,36 +92,44 @@ fn uv_of(world: DVec3) -> [f64; 2] {
 }
 
 /// Bilinear between the texels' centres, around in u, held in v.
-fn lookup(texels: &[[f64; 3]], [u, v]: [f64; 2]) -> DVec3 {
+fn bilinear<T: std::ops::Mul<f64, Output = T> + std::iter::Sum>(
+    value: impl Fn(usize) -> T,
+    [u, v]: [f64; 2],
+) -> T {
     let (x, y) = (u * WIDTH as f64 - 0.5, v * HEIGHT as f64 - 0.5);
-    let mut sum = DVec3::ZERO;
-    for (dx, dy) in [(0.0, 0.0), (1.0, 0.0), (0.0, 1.0), (1.0, 1.0)] {
-        let (cx, cy) = (x.floor() + dx, y.floor() + dy);
-        let weight = (1.0 - (x - cx).abs()) * (1.0 - (y - cy).abs());
-        let column = cx.rem_euclid(WIDTH as f64) as usize;
-        let row = cy.clamp(0.0, HEIGHT as f64 - 1.0) as usize;
-        sum += DVec3::from(texels[row * WIDTH + column]) * weight;
-    }
-    sum * FACTOR
+    [(0.0, 0.0), (1.0, 0.0), (0.0, 1.0), (1.0, 1.0)]
+        .into_iter()
+        .map(|(dx, dy)| {
+            let (cx, cy) = (x.floor() + dx, y.floor() + dy);
+            let weight = (1.0 - (x - cx).abs()) * (1.0 - (y - cy).abs());
+            let column = cx.rem_euclid(WIDTH as f64) as usize;
+            let row = cy.clamp(0.0, HEIGHT as f64 - 1.0) as usize;
+            value(row * WIDTH + column) * weight
+        })
+        .sum()
+}
+
+fn lookup(texels: &[[f64; 3]], uv: [f64; 2]) -> DVec3 {
+    bilinear(|i| DVec3::from(texels[i]), uv) * FACTOR
+}
+
+/// Density per steradian, with the choice of the map.
+fn density(densities: &[f64], uv: [f64; 2], sine: f64) -> f64 {
+    CHOICE * bilinear(|i| densities[i], uv) / sine
 }
 
 /// Error of (u, v) from directions in single precision: a handful of roundings and an
 /// arc tangent whose error on software devices is 1e-6; counted in texels.
 const UV_ERROR: f64 = 2e-6;
 
-/// The texel that holds (u, v), or none within the error of its border.
-fn cell_of([u, v]: [f64; 2], sine: f64) -> Option<usize> {
-    let (x, y) = (u * WIDTH as f64, v * HEIGHT as f64);
-    let near = |t: f64, error: f64| (t - t.round()).abs() < error;
-    let margin = UV_ERROR * WIDTH as f64;
-    if near(x, margin / sine) || near(y, margin) {
-        return None;
-    }
-    Some(y as usize * WIDTH + x as usize)
-}
-
 /// Largest difference of neighbouring texels after the factor: bounds the slope of the look-up.
 const STEEPEST: f64 = 300.0 * FACTOR;
+
+/// How far the density may be off for what `UV_ERROR` moves it, and three roundings of it and of the sine.
+fn density_error(densities: &[f64], pdf: f64, sine: f64) -> f64 {
+    let steepest = densities.iter().fold(0.0, |a: f64, b| a.max(*b));
+    CHOICE * steepest * UV_ERROR * WIDTH as f64 * 2.0 / (sine * sine) + 1e-6 * pdf
+}
 
 #[test]
 fn directions_have_their_density() {
@@ -133,7 +148,6 @@ fn directions_have_their_density() {
     const PHI: usize = 64;
     const Y: usize = 32;
     let mut counts = vec![0; PHI * Y];
-    let mut on_border = 0;
     for answer in &answers {
         let wi = glam::Vec4::from(answer.a).truncate().as_dvec3();
         assert!(
@@ -155,22 +169,15 @@ fn directions_have_their_density() {
                 "{wi}: {radiance:?}, {expected}"
             );
         }
-        match cell_of(uv, sine) {
-            None => on_border += 1,
-            Some(cell) => {
-                let pdf = CHOICE * densities[cell];
-                for got in [answer.a[3], answer.b[3]] {
-                    // Three roundings.
-                    assert!(
-                        (f64::from(got) / pdf - 1.0).abs() < 2e-7,
-                        "{wi}: {got} {pdf}"
-                    );
-                }
-            }
+        let pdf = density(&densities, uv, sine);
+        for got in [answer.a[3], answer.b[3]] {
+            let error = (f64::from(got) - pdf).abs();
+            assert!(
+                error < density_error(&densities, pdf, sine),
+                "{wi}: {got} {pdf}"
+            );
         }
     }
-    // Of the lines within the margin: 2 · margin of each texel in both axes.
-    assert!(on_border < answers.len() / 1000, "{on_border}");
 
     let mut family = Family::default();
     let p = world_cells(&densities, PHI, Y);
@@ -180,29 +187,36 @@ fn directions_have_their_density() {
     finish(device);
 }
 
-/// Exact probabilities: overlaps of the world's cells with the turned texels.
+/// Exact probabilities: the density is bilinear in (u, v) on the parts that cells of the world and
+/// of the map have in common, so that its value at their middle is its mean.
 fn world_cells(densities: &[f64], columns: usize, rows: usize) -> Vec<f64> {
-    let overlap = |a: [f64; 2], b: [f64; 2]| (a[1].min(b[1]) - a[0].max(b[0])).max(0.0);
     let mut p = vec![0.0; columns * rows];
-    for (texel, density) in densities.iter().enumerate() {
-        let (x, row) = (texel % WIDTH, texel / WIDTH);
-        // Azimuth of the map less the rotation; u = 0.5 looks along −Z.
-        let start = TAU * (x as f64 / WIDTH as f64 - 0.5) - ROTATION;
-        let phi = [start, start + TAU / WIDTH as f64];
-        for (i, p) in p.iter_mut().enumerate() {
-            let (column, line) = ((i % columns) as f64, (i / columns) as f64);
-            let step = TAU / columns as f64;
-            let around: f64 = [-2.0, -1.0, 0.0, 1.0]
-                .map(|turn| TAU * turn + step * column)
-                .map(|low| overlap(phi, [low, low + step]))
-                .iter()
-                .sum();
-            let high = 1.0 - 2.0 * line / rows as f64;
-            let height = overlap([edge(row + 1), edge(row)], [high - 2.0 / rows as f64, high]);
-            *p += density * around * height;
+    for (i, p) in p.iter_mut().enumerate() {
+        let (column, line) = ((i % columns) as f64, (i / columns) as f64);
+        let v_of = |line: f64| (1.0 - 2.0 * line / rows as f64).clamp(-1.0, 1.0).acos() / PI;
+        // Azimuth of the world plus the rotation is that of the map; u = 0.5 looks along −Z.
+        let u_of = |column: f64| column / columns as f64 + ROTATION / TAU + 0.5;
+        for [u0, u1] in parts([u_of(column), u_of(column + 1.0)], WIDTH) {
+            for [v0, v1] in parts([v_of(line), v_of(line + 1.0)], HEIGHT) {
+                let middle = [(0.5 * (u0 + u1)).rem_euclid(1.0), 0.5 * (v0 + v1)];
+                let mean = TAU * PI * bilinear(|i| densities[i], middle);
+                *p += mean * (u1 - u0) * (v1 - v0);
+            }
         }
     }
     p
+}
+
+/// Cuts a range at the centres of `count` texels a unit.
+fn parts([low, high]: [f64; 2], count: usize) -> Vec<[f64; 2]> {
+    let mut cuts = vec![low];
+    let mut k = (low * count as f64 - 0.5).floor() + 1.0;
+    while (k + 0.5) / (count as f64) < high {
+        cuts.push((k + 0.5) / count as f64);
+        k += 1.0;
+    }
+    cuts.push(high);
+    cuts.windows(2).map(|w| [w[0], w[1]]).collect()
 }
 
 #[test]
@@ -253,10 +267,11 @@ fn every_direction_finds_its_place() {
             (got - expected).abs().max_element() < slope + 1e-6,
             "{d}: {got}, {expected}"
         );
-        if let Some(cell) = cell_of(uv, sine) {
-            let pdf = CHOICE * densities[cell];
-            assert!((f64::from(answer.a[3]) - pdf).abs() <= 2e-7 * pdf, "{d}");
-        }
+        let pdf = density(&densities, uv, sine);
+        assert!(
+            (f64::from(answer.a[3]) - pdf).abs() <= density_error(&densities, pdf, sine),
+            "{d}"
+        );
     }
     println!("environment_uv off by {worst:?}");
     finish(device);
