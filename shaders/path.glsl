@@ -17,8 +17,10 @@
 #include "direct.glsl"
 #include "rng.glsl"
 
-// Roulette starts after this many scattering events: short paths carry most of the light.
-const uint ROULETTE_START = 3u;
+// Roulette starts after this many scattering events: short paths carry most of the light …
+const uint ROULETTE_START = 2u;
+// … and thins the paths whose throughput is less than this, which is what survivors then have.
+const float ROULETTE_WEIGHT = 0.25;
 // From here on survival at event n is at most 1 − 2/n, so that light that nothing
 // absorbs ends with probability one, after twice as many events on average. The
 // weight keeps the mean. Random walks in white media are rarely this long …
@@ -80,8 +82,7 @@ void path_leave(inout PathState path, SurfacePoint s, vec3 origin, vec3 directio
 // Roulette by throughput; false when the path ends. What is left has its weight.
 bool path_survives(inout PathState path, float u)
 {
-    // Survival is the throughput itself, so that the weight of long paths stays near one.
-    float survival = path.depth >= ROULETTE_START ? min(max_component(path.beta), 1.0) : 1.0;
+    float survival = path.depth >= ROULETTE_START ? min(max_component(path.beta) / ROULETTE_WEIGHT, 1.0) : 1.0;
     if (path.depth >= LONG_PATH) {
         survival = min(survival, 1.0 - 2.0 / float(path.depth));
     }
