@@ -320,7 +320,7 @@ pub const LIGHTS: &[Case] = &[
                 "BsdfOnly",
             ),
             passes(
-                "etendue::render::lights::tests::environment_density_integrates_to_one_and_covers_light",
+                "etendue::render::environment::tests::every_direction_with_light_has_a_density_unless_scattering_finds_it",
             ),
         ],
     },
@@ -361,7 +361,7 @@ pub const LIGHTS: &[Case] = &[
         expected: "exactly 0",
         verdict: Holds,
         evidence: &[
-            passes("etendue::render::lights::tests::black_environment_has_no_table"),
+            passes("etendue::render::environment::tests::a_black_map_is_none"),
             line("stability::light::without_light_it_is_dark", "dark"),
         ],
     },
