@@ -276,7 +276,9 @@ impl Renderer {
         let missing = film.missing(samples);
         let samples_before = film.samples();
         let total = samples_before + missing.iter().map(|r| r.end - r.start).sum::<u64>();
-        let mut passes = Passes::new(missing, self.tuning.max_pass);
+        let params = self.backend.frame().params;
+        let pixels = u64::from(params.window_width) * u64::from(params.window_height);
+        let mut passes = Passes::new(missing, pixels, self.tuning.max_pass);
         while let Some((first, level)) = passes.upcoming() {
             let pass_start = Instant::now();
             let done = (samples_before + passes.done()) as f64;
@@ -324,9 +326,12 @@ impl Renderer {
         for Band { tiles, pixels } in self.backend.frame().bands() {
             let mut tile = tiles.start;
             while tile < tiles.end {
-                let count = self.tiles_per_batch.min(tiles.end - tile);
+                let mut count = self.tiles_per_batch.min(tiles.end - tile);
                 let is_together = self.pace.is_together();
                 let is_trial = self.pace.is_trial(1 << level);
+                if is_trial {
+                    count = count.min(Pace::trial_tiles(tiles.end - tiles.start));
+                }
                 let rays_before = if is_trial {
                     self.backend.ledger()?.0
                 } else {

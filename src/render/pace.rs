@@ -3,15 +3,14 @@
 //! paths are of unequal length, as in closed rooms; waiting keeps camera rays coherent,
 //! as under an open sky. The first batches try both, and the faster one stays.
 
-/// Batches of each kind that are timed.
-const TRIALS: u32 = 2;
+/// The batches that are timed, true where lanes start together: what changes evenly from batch to batch cancels.
+const TRIALS: [bool; 4] = [false, true, true, false];
 /// A batch of fewer samples a lane says nothing: its paths end at much the same time.
 const MIN_SAMPLES: u32 = 4;
 
 /// Rays and seconds of one kind.
 #[derive(Clone, Copy, Default)]
 struct Rate {
-    batches: u32,
     rays: f64,
     seconds: f64,
 }
@@ -20,30 +19,34 @@ struct Rate {
 #[derive(Clone, Copy, Default)]
 pub(super) struct Pace {
     rates: [Rate; 2],
+    trials: usize,
 }
 
 impl Pace {
     /// Whether a batch of `samples` a pixel is a trial, to be told to [`Pace::note`].
     pub fn is_trial(&self, samples: u32) -> bool {
-        samples >= MIN_SAMPLES && self.rates.iter().any(|rate| rate.batches < TRIALS)
+        samples >= MIN_SAMPLES && self.trials < TRIALS.len()
+    }
+
+    /// The most tiles of a trial out of those of a pass: all trials fit into one pass.
+    pub fn trial_tiles(tiles: u32) -> u32 {
+        tiles.div_ceil(TRIALS.len() as u32)
     }
 
     /// Whether the lanes of the next batch start together.
     pub fn is_together(&self) -> bool {
         let [at_once, together] = self.rates;
-        if together.batches < TRIALS {
-            return at_once.batches > together.batches;
-        }
-        // Rays rather than samples: the trials may be different parts of the picture.
-        together.rays * at_once.seconds > at_once.rays * together.seconds
+        // Rays rather than samples: the trials are different parts of the picture.
+        let is_faster = together.rays * at_once.seconds > at_once.rays * together.seconds;
+        TRIALS.get(self.trials).copied().unwrap_or(is_faster)
     }
 
     /// Notes how long a trial took.
     pub fn note(&mut self, is_together: bool, rays: u64, seconds: f64) {
         let rate = &mut self.rates[usize::from(is_together)];
-        rate.batches += 1;
         rate.rays += rays as f64;
         rate.seconds += seconds;
+        self.trials += 1;
     }
 }
 
@@ -56,14 +59,12 @@ mod tests {
         for (at_once, together) in [(2.0, 1.0), (1.0, 2.0)] {
             let mut pace = Pace::default();
             assert!(!pace.is_trial(MIN_SAMPLES - 1));
-            let mut trials = 0;
             while pace.is_trial(MIN_SAMPLES) {
                 let kind = pace.is_together();
                 let rate = if kind { together } else { at_once };
                 pace.note(kind, 1000, 1000.0 / rate);
-                trials += 1;
             }
-            assert_eq!(trials, 2 * TRIALS);
+            assert_eq!(pace.trials, TRIALS.len());
             assert_eq!(pace.is_together(), together > at_once);
         }
     }
