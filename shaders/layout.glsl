@@ -85,6 +85,7 @@ struct Instance {
     vec3 object_from_world_t;
     uint reserved_2;
 };
+const uint INSTANCE_TEXELS = 8u;
 
 // `triangles` holds (vertex, vertex, vertex, material | TRIANGLE_* flags).
 const uint TRIANGLE_MATERIAL_MASK = 0x00FFFFFFu;
@@ -155,7 +156,7 @@ struct Medium {
 };
 const uint MEDIUM_TEXELS = 3u;
 
-// A texture applied to a slot. `first_texel` is NONE where the slot is empty.
+// A texture applied to a slot, read as three texels. `first_texel` is NONE where the slot is empty.
 struct TextureUse {
     vec3 uv_row_u;              // u' = row · (u, v, 1)
     uint first_texel;           // in `texels`
@@ -166,6 +167,7 @@ struct TextureUse {
     uint uv_set;
     uint reserved_0;
 };
+const uint TEXTURE_USE_TEXELS = 3u;
 
 const uint FORMAT_RGBA8 = 0u;
 const uint FORMAT_SRGB8 = 1u;
@@ -273,12 +275,12 @@ const uint BLOCK_LEVEL = 4u;
 const uint BIND_PARAMS = 0u;         // uniform buffer: Params
 const uint BIND_FILM = 1u;           // storage: float[]
 const uint BIND_LEDGER = 2u;         // storage: uint[LEDGER_SIZE]
-const uint BIND_INSTANCES = 3u;      // storage: Instance[]
+const uint BIND_INSTANCES = 3u;      // texel buffer RGBA32UI: Instance[]
 const uint BIND_TRIANGLES = 4u;      // texel buffer RGBA32UI
 const uint BIND_VERTICES = 5u;       // texel buffer RGBA32F
 const uint BIND_ATTRIBUTES = 6u;     // texel buffer RGBA32F
 const uint BIND_MATERIALS = 7u;      // texel buffer RGBA32UI: Material[]
-const uint BIND_TEXTURE_USES = 8u;   // storage: TextureUse[]
+const uint BIND_TEXTURE_USES = 8u;   // texel buffer RGBA32UI: TextureUse[]
 const uint BIND_TEXELS = 9u;         // texel buffer R32UI
 const uint BIND_LIGHTS = 10u;        // texel buffer RGBA32UI: Light[]
 const uint BIND_ENV_MAP = 11u;       // texel buffer RGBA32F

@@ -8,31 +8,60 @@
 #include "spec.glsl"
 
 layout(binding = BIND_PARAMS, scalar) uniform ParamsBlock { Params params; };
-layout(binding = BIND_INSTANCES, scalar) readonly buffer InstancesBlock { Instance instances[]; };
-layout(binding = BIND_TEXTURE_USES, scalar) readonly buffer TextureUsesBlock { TextureUse texture_uses[]; };
 layout(binding = BIND_ENV_TABLE, scalar) readonly buffer EnvTableBlock { EnvCell env_table[]; };
 
 // wgpu has no texel buffers; the same records then are storage buffers.
 #ifdef WGPU
 #define texelFetch(array, i) array[i]
+layout(binding = BIND_INSTANCES, scalar) readonly buffer InstancesBlock { uvec4 instances[]; };
 layout(binding = BIND_TRIANGLES, scalar) readonly buffer TrianglesBlock { uvec4 triangles[]; };
 layout(binding = BIND_VERTICES, scalar) readonly buffer VerticesBlock { vec4 vertices[]; };
 layout(binding = BIND_ATTRIBUTES, scalar) readonly buffer AttributesBlock { vec4 attributes[]; };
 layout(binding = BIND_MATERIALS, scalar) readonly buffer MaterialsBlock { uvec4 materials[]; };
+layout(binding = BIND_TEXTURE_USES, scalar) readonly buffer TextureUsesBlock { uvec4 texture_uses[]; };
 layout(binding = BIND_TEXELS, scalar) readonly buffer TexelsBlock { uint texels[]; };
 layout(binding = BIND_LIGHTS, scalar) readonly buffer LightsBlock { uvec4 lights[]; };
 layout(binding = BIND_ENV_MAP, scalar) readonly buffer EnvMapBlock { vec4 env_map[]; };
 layout(binding = BIND_MEDIA, scalar) readonly buffer MediaBlock { uvec4 media[]; };
 #else
+layout(binding = BIND_INSTANCES) uniform usamplerBuffer instances;
 layout(binding = BIND_TRIANGLES) uniform usamplerBuffer triangles;
 layout(binding = BIND_VERTICES) uniform samplerBuffer vertices;
 layout(binding = BIND_ATTRIBUTES) uniform samplerBuffer attributes;
 layout(binding = BIND_MATERIALS) uniform usamplerBuffer materials;
+layout(binding = BIND_TEXTURE_USES) uniform usamplerBuffer texture_uses;
 layout(binding = BIND_TEXELS) uniform usamplerBuffer texels;
 layout(binding = BIND_LIGHTS) uniform usamplerBuffer lights;
 layout(binding = BIND_ENV_MAP) uniform samplerBuffer env_map;
 layout(binding = BIND_MEDIA) uniform usamplerBuffer media;
 #endif
+
+// Where a group is placed; groups of words that are not used cost nothing.
+Instance scene_instance(uint index)
+{
+    int at = int(INSTANCE_TEXELS * index);
+    uvec4 a = texelFetch(instances, at);
+    uvec4 b = texelFetch(instances, at + 1);
+    uvec4 c = texelFetch(instances, at + 2);
+    uvec4 d = texelFetch(instances, at + 3);
+    uvec4 e = texelFetch(instances, at + 4);
+    uvec4 f = texelFetch(instances, at + 5);
+    uvec4 g = texelFetch(instances, at + 6);
+    uvec4 h = texelFetch(instances, at + 7);
+    return Instance(uintBitsToFloat(a.xyz), a.w, uintBitsToFloat(b.xyz), b.w, uintBitsToFloat(c.xyz), c.w,
+                    uintBitsToFloat(d.xyz), d.w, uintBitsToFloat(e.xyz), e.w, uintBitsToFloat(f.xyz), f.w,
+                    uintBitsToFloat(g.xyz), g.w, uintBitsToFloat(h.xyz), h.w);
+}
+
+// A texture in a slot.
+TextureUse scene_texture_use(uint index)
+{
+    int at = int(TEXTURE_USE_TEXELS * index);
+    uvec4 a = texelFetch(texture_uses, at);
+    uvec4 b = texelFetch(texture_uses, at + 1);
+    uvec4 c = texelFetch(texture_uses, at + 2);
+    return TextureUse(uintBitsToFloat(a.xyz), a.w, uintBitsToFloat(b.xyz), b.w, c.x, c.y, c.z, c.w);
+}
 
 // The material's words; groups that are not used cost nothing.
 Material scene_material(uint index)

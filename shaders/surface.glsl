@@ -62,7 +62,7 @@ struct TriangleUv {
 
 uvec4 surface_triangle(uint instance, uint primitive)
 {
-    uint first = HAS_INSTANCES ? instances[instance].first_triangle : 0u;
+    uint first = HAS_INSTANCES ? scene_instance(instance).first_triangle : 0u;
     return texelFetch(triangles, int(first + primitive));
 }
 
@@ -93,8 +93,8 @@ TriangleShape surface_shape(uint instance, uvec4 triangle)
     TriangleShape shape;
     shape.is_mirrored = false;
     vec3 magnitude = max(abs(a), max(abs(b), abs(c)));
-    if (HAS_INSTANCES && instances[instance].is_identity == 0u) {
-        Instance placed = instances[instance];
+    if (HAS_INSTANCES && scene_instance(instance).is_identity == 0u) {
+        Instance placed = scene_instance(instance);
         mat3 m = mat3(placed.world_from_object_x, placed.world_from_object_y, placed.world_from_object_z);
         shape.v0 = m * a + placed.world_from_object_t;
         shape.e1 = m * (b - a);
@@ -134,7 +134,7 @@ vec4 surface_texture(Material material, uint slot, uvec4 triangle, vec2 bary)
     if (!HAS_TEXTURES || (material.flags & MATERIAL_HAS_TEXTURES) == 0u) {
         return vec4(1.0);
     }
-    TextureUse use = texture_uses[material.first_texture + slot];
+    TextureUse use = scene_texture_use(material.first_texture + slot);
     if (use.first_texel == NONE) {
         return vec4(1.0);
     }
@@ -200,8 +200,8 @@ vec3 surface_bend(vec3 n, vec3 ng, vec3 wo)
 // Object-space direction of a normal carried to world space, not normalised.
 vec3 surface_world_normal(uint instance, vec3 n)
 {
-    if (HAS_INSTANCES && instances[instance].is_identity == 0u) {
-        Instance placed = instances[instance];
+    if (HAS_INSTANCES && scene_instance(instance).is_identity == 0u) {
+        Instance placed = scene_instance(instance);
         return vec3(dot(placed.object_from_world_x, n), dot(placed.object_from_world_y, n), dot(placed.object_from_world_z, n));
     }
     return n;
@@ -211,7 +211,7 @@ vec3 surface_world_normal(uint instance, vec3 n)
 // against dp/dv, since v grows downwards in an image and green is up.
 vec3 surface_mapped_normal(Material material, uint instance, uvec4 triangle, TriangleShape shape, vec2 bary, vec3 n)
 {
-    TextureUse use = texture_uses[material.first_texture + TEXTURE_NORMAL];
+    TextureUse use = scene_texture_use(material.first_texture + TEXTURE_NORMAL);
     if (use.first_texel == NONE) {
         return n;
     }
@@ -226,9 +226,9 @@ vec3 surface_mapped_normal(Material material, uint instance, uvec4 triangle, Tri
         vec4 b = texelFetch(attributes, int(3u * triangle.y));
         vec4 c = texelFetch(attributes, int(3u * triangle.z));
         tangent = a.xyz + bary.x * (b.xyz - a.xyz) + bary.y * (c.xyz - a.xyz);
-        if (HAS_INSTANCES && instances[instance].is_identity == 0u) {
-            tangent = mat3(instances[instance].world_from_object_x, instances[instance].world_from_object_y,
-                           instances[instance].world_from_object_z) * tangent;
+        if (HAS_INSTANCES && scene_instance(instance).is_identity == 0u) {
+            Instance placed = scene_instance(instance);
+            tangent = mat3(placed.world_from_object_x, placed.world_from_object_y, placed.world_from_object_z) * tangent;
         }
         sign_b = shape.is_mirrored ? -a.w : a.w;
     } else {
@@ -335,7 +335,7 @@ SurfacePoint surface_point(Hit hit, vec3 wo)
         s.emission = surface_emission(material, triangle, hit.bary);
         s.emission_pdf = material.emission_pdf;
         s.placement = hit.instance;
-        s.triangle = hit.primitive + (HAS_INSTANCES ? instances[hit.instance].first_triangle : 0u);
+        s.triangle = hit.primitive + (HAS_INSTANCES ? scene_instance(hit.instance).first_triangle : 0u);
     }
     if (HAS_SPECULAR) {
         vec4 factors = surface_texture(material, TEXTURE_METALLIC_ROUGHNESS, triangle, hit.bary);

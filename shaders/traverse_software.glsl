@@ -312,12 +312,13 @@ bool bvh_trace(vec3 origin, vec3 dir, float t_min, float t_max, uint from, bool 
                 if (leaves.y != 0u) bvh_push(leaves);
                 base = bvh_waiting();
                 instance = v0.w;
-                nodes = uvec2(instances[instance].bvh_root, 0x80000000u);
+                Instance placed = scene_instance(instance);
+                nodes = uvec2(placed.bvh_root, 0x80000000u);
                 leaves.y = 0u;
-                vec3 x = instances[instance].object_from_world_x;
-                vec3 y = instances[instance].object_from_world_y;
-                vec3 z = instances[instance].object_from_world_z;
-                vec3 moved = x * origin.x + y * origin.y + z * origin.z + instances[instance].object_from_world_t;
+                vec3 x = placed.object_from_world_x;
+                vec3 y = placed.object_from_world_y;
+                vec3 z = placed.object_from_world_z;
+                vec3 moved = x * origin.x + y * origin.y + z * origin.z + placed.object_from_world_t;
                 ray = bvh_ray(moved, x * dir.x + y * dir.y + z * dir.z);
             } else if (bvh_intersect(ray, record, v0, instance, t_min, hit) && any_hit) {
                 // Nothing left to do: the loop ends by itself.

@@ -111,8 +111,8 @@ impl VulkanBackend {
             ),
             (
                 layout::BIND_INSTANCES,
-                storage,
-                upload(device, "instances", &instances)?,
+                BindingKind::Texel,
+                texel(device, "instances", RECORDS, &instances, false)?,
             ),
             (
                 layout::BIND_TRIANGLES,
@@ -144,8 +144,8 @@ impl VulkanBackend {
             ),
             (
                 layout::BIND_TEXTURE_USES,
-                storage,
-                upload(device, "texture uses", &data.texture_uses)?,
+                BindingKind::Texel,
+                texel(device, "texture uses", RECORDS, &data.texture_uses, false)?,
             ),
             (
                 layout::BIND_TEXELS,

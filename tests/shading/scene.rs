@@ -55,12 +55,12 @@ impl Scene {
         use BindingKind::{Storage, Texel, Uniform};
         let bindings = [
             (layout::BIND_PARAMS, Uniform),
-            (layout::BIND_INSTANCES, Storage),
+            (layout::BIND_INSTANCES, Texel),
             (layout::BIND_TRIANGLES, Texel),
             (layout::BIND_VERTICES, Texel),
             (layout::BIND_ATTRIBUTES, Texel),
             (layout::BIND_MATERIALS, Texel),
-            (layout::BIND_TEXTURE_USES, Storage),
+            (layout::BIND_TEXTURE_USES, Texel),
             (layout::BIND_TEXELS, Texel),
             (layout::BIND_LIGHTS, Texel),
             (layout::BIND_ENV_MAP, Texel),
@@ -100,12 +100,12 @@ impl Scene {
         let none: [u32; 0] = [];
         vec![
             new(device, Usage::UNIFORM, &[self.params]),
-            new(device, Usage::STORAGE, &none),
+            new(device, texel(TexelFormat::Rgba32Uint), &none),
             new(device, texel(TexelFormat::Rgba32Uint), &self.triangles),
             new(device, texel(TexelFormat::Rgba32Float), &self.vertices),
             new(device, texel(TexelFormat::Rgba32Float), &none),
             new(device, texel(TexelFormat::Rgba32Uint), &self.materials),
-            new(device, Usage::STORAGE, &self.texture_uses),
+            new(device, texel(TexelFormat::Rgba32Uint), &self.texture_uses),
             new(device, texel(TexelFormat::R32Uint), &self.texels),
             new(device, texel(TexelFormat::Rgba32Uint), &self.lights),
             new(device, texel(TexelFormat::Rgba32Float), &self.env_map),
