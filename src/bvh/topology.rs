@@ -25,22 +25,19 @@ impl Effort {
         let preset = match self {
             Self::Group(Quality::Fast) => BvhBuildParams::very_fast_build(),
             Self::Group(Quality::Balanced) => BvhBuildParams::medium_build(),
-            Self::Group(Quality::Best) => BvhBuildParams::slow_build(),
-            Self::TopLevel => BvhBuildParams::very_slow_build(),
+            Self::Group(Quality::Best) | Self::TopLevel => BvhBuildParams::very_slow_build(),
         };
         BvhBuildParams {
             // Each triangle is in one leaf only: records are not duplicated and boxes contain them.
             pre_split: false,
-            max_prims_per_leaf: match self {
-                Self::Group(_) => MAX_LEAF as u32,
-                Self::TopLevel => 1,
-            },
+            // A record is dearer to meet than its box, and lanes that have one wait for those that have more.
+            max_prims_per_leaf: 1,
             ..preset
         }
     }
 }
 
-/// Records in a leaf at most: what the node's unary count holds.
+/// Records in a leaf of a balanced tree at most: what the node's unary count holds.
 const MAX_LEAF: usize = 3;
 
 /// Disturbance of a box relative to its longest side: does not change which tree is good.

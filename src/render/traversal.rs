@@ -21,6 +21,9 @@ use crate::spec::{Kernel, Spec, kernels};
 /// Invocations of a work group in both kernels: INVOCATION_GROUP of invocation.glsl.
 pub(super) const GROUP: u32 = 64;
 
+/// The best tree is built of scenes with so many triangles, in a quarter of a second more.
+const BEST_TRIANGLES: usize = 1 << 18;
+
 /// The own tree of a scene, where rays are traced in it.
 pub(super) fn own_tree(choice: BackendChoice, data: &SceneData) -> Result<Option<Bvh>> {
     match choice {
@@ -75,7 +78,11 @@ pub(super) fn build_bvh(data: &SceneData) -> Result<Bvh> {
             });
         }
     }
-    Bvh::build(&groups, &instances, Quality::Balanced)
+    let quality = match geometry.triangles.len() {
+        0..=BEST_TRIANGLES => Quality::Best,
+        _ => Quality::Balanced,
+    };
+    Bvh::build(&groups, &instances, quality)
 }
 
 /// Tells the kernels where the trees of the groups and of the top level start.
