@@ -4,7 +4,7 @@
 # should find it, the pages that tests write. Goes on after a failure, and ends with
 # what it proved and what it could not.
 #
-#   scripts/nightly.sh [stage…]     of: suite fresh stability mutants; all of them if none is named
+#   scripts/nightly.sh [stage…]     of: suite fuzz fresh stability mutants; all of them if none is named
 #   ETENDUE_SEED=N                  seed of the stage `fresh`; else another one each night
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
@@ -45,16 +45,18 @@ fresh_seed() {
 }
 pages() { ETENDUE_STABILITY_LOG="$log" scripts/stability.sh; }
 every_mutant() { ETENDUE_NIGHTLY=0 ETENDUE_MUTANTS_ALL=1 scripts/mutants.sh; }
+fuzzing() { ETENDUE_FUZZ_SEED="$((seed % 2147483647 + 1))" scripts/fuzz.sh; }
 unchanged() {
     command -v git >/dev/null && git diff --stat -- docs/stability.md docs/physics.md || true
 }
 
 stages=("$@")
-(($# > 0)) || stages=(suite fresh stability mutants)
+(($# > 0)) || stages=(suite fuzz fresh stability mutants)
 printf 'nightly.sh: seed %s, stages: %s\n' "$seed" "${stages[*]}"
 for name in "${stages[@]}"; do
     case "$name" in
         suite) stage "every test passes with the counts of the night" whole_suite ;;
+        fuzz) stage "a million damaged files of every kind do no harm" fuzzing ;;
         fresh) stage "the pictures of known answers hold for seed $seed" fresh_seed ;;
         stability) stage "every case of docs/stability.md is measured and written" pages ;;
         mutants) stage "every planted error is found, and no control; docs/physics.md is written" every_mutant ;;

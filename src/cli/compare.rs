@@ -8,6 +8,7 @@ use etendue::image_io::{Format, Image, Tone, read_exr, write_exr, write_png};
 use serde_json::{Value as Json, json};
 
 use super::failure::{self, Failure, Outcome};
+use super::numbers::{counts, level};
 use super::write_stdout;
 
 /// `etendue compare`
@@ -29,24 +30,6 @@ pub struct CompareArgs {
     /// Print one JSON object
     #[arg(long)]
     pub json: bool,
-}
-
-fn level(text: &str) -> Result<f64, String> {
-    match text.parse::<f64>() {
-        Ok(value) if value > 0.0 && value < 1.0 => Ok(value),
-        _ => Err(String::from("must be a number between 0 and 1")),
-    }
-}
-
-fn counts(text: &str) -> Result<[f64; 2], String> {
-    let numbers: Result<Vec<u64>, _> = text.split(',').map(|n| n.trim().parse()).collect();
-    match numbers.as_deref() {
-        Ok(&[n]) if n > 0 => Ok([n as f64; 2]),
-        Ok(&[n, m]) if n > 0 && m > 0 => Ok([n as f64, m as f64]),
-        _ => Err(String::from(
-            "must be one number of samples above 0, or two, e.g. 64,4096",
-        )),
-    }
 }
 
 /// Compares and prints.

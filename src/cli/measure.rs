@@ -7,9 +7,10 @@ use etendue::{Error, Result};
 use glam::DVec3;
 use serde_json::json;
 
-use super::args::{MeasureArgs, numbers};
+use super::args::MeasureArgs;
 use super::failure::{Failure, Outcome};
 use super::interrupt::Interrupt;
+use super::numbers::numbers;
 use super::render::load_scene;
 use super::{write_stderr, write_stdout};
 

@@ -13,6 +13,7 @@ mod info;
 mod interrupt;
 mod measure;
 mod merge;
+mod numbers;
 mod plan;
 mod progress;
 mod render;

@@ -7,12 +7,12 @@ use clap::Parser;
 use etendue::image_io::{Metadata, read_exr};
 use etendue::{Error, Result};
 
-use super::args::{self, Arguments, Command, RenderArgs, RerenderArgs};
+use super::args::{Arguments, Command, RenderArgs, RerenderArgs};
 use super::failure::{Failure, Outcome};
 use super::header::{Job, Record};
 use super::identity::{DEVICE, JOB, check, number, show, text};
 use super::progress::Reporter;
-use super::render;
+use super::{numbers, render};
 
 /// A render to be done again.
 pub struct Repeat {
@@ -39,7 +39,7 @@ pub fn run(args: &RerenderArgs) -> Result<Outcome, Failure> {
 /// Ranges of samples in a header.
 pub fn samples(path: &Path, header: &Metadata, field: &str) -> Result<Vec<Range<u64>>> {
     let parse = |text: &str| {
-        let ranges = text.split(',').map(|range| args::samples(range).ok());
+        let ranges = text.split(',').map(|range| numbers::samples(range).ok());
         ranges.collect::<Option<Vec<_>>>()
     };
     let ranges = text(header, field).and_then(parse);

@@ -6,7 +6,8 @@ use clap::{Args, ValueEnum};
 use etendue::film::MAX_SAMPLES;
 use etendue::settings::Estimator;
 
-use super::super::args::{Backend, EstimatorName, positive, side};
+use super::super::args::{Backend, EstimatorName, side};
+use super::super::numbers::positive;
 
 /// `etendue bench`
 #[derive(Args)]
