@@ -9,14 +9,18 @@
 
 #[path = "common/mod.rs"]
 mod common;
+#[path = "common/statistics.rs"]
+mod statistics;
 
 use std::f64::consts::PI;
 
 use common::*;
+use etendue::compare::tails::student_quantile;
 use etendue::render::{Reading, Tuning};
 use etendue::scene::{LightKind, Material, PunctualLight, Scene};
 use etendue::settings::{Sensor, Settings};
 use glam::{DVec3, Vec3};
+use statistics::Estimate;
 
 /// A reading of the sensor from 1024 pixels of `samples`, or none without a device.
 fn read(scene: &Scene, sensor: Sensor, samples: u64, seed: u64) -> Option<Reading> {
@@ -29,21 +33,13 @@ fn read(scene: &Scene, sensor: Sensor, samples: u64, seed: u64) -> Option<Readin
     Some(Reading::of(&rendered.film, &sensor, scene).unwrap())
 }
 
-/// The reading is `truth` within the relative bound `delta`, 4.9 standard errors included.
+/// The reading is `truth` within the relative bound `delta`, chance included.
 fn assert_reads(what: &str, scene: &Scene, sensor: Sensor, truth: f64, delta: f64) {
     let Some(reading) = read(scene, sensor, 1024, 1) else {
         return;
     };
     for (value, error) in reading.value.into_iter().zip(reading.error) {
-        let off = (value - truth).abs();
-        println!(
-            "{what}: {value:.7}, truth {truth:.7}, off {off:.1e} ± {:.1e}",
-            4.9 * error
-        );
-        assert!(
-            off + 4.9 * error <= delta * truth,
-            "{what}: {value} instead of {truth}"
-        );
+        Estimate::new(value, error).assert_is(what, truth, delta);
     }
 }
 
@@ -123,8 +119,8 @@ fn depth_counts_from_the_first_surface() {
         return;
     };
     let reading = Reading::of(&r.film, &sensor, &scene).unwrap();
-    let (off, bound) = ((reading.value[0] - 1.5 * PI).abs(), 4.9 * reading.error[0]);
-    assert!(off + bound <= 5e-3 * 1.5 * PI, "{}", reading.value[0]);
+    let seen = Estimate::new(reading.value[0], reading.error[0]);
+    seen.assert_is("one scattering", 1.5 * PI, 5e-3);
 }
 
 /// In glass all radiance that gets in is n² times as large: the hemisphere above a meter under a plane face holds
@@ -332,9 +328,9 @@ fn interval_is_what_it_says() {
     let Some(r) = render(&scene, &settings, Tuning::default()) else {
         return;
     };
-    // 97.5 % quantile of Student's t: the error of each pixel comes from 16 nets.
+    // The error of each pixel comes from 16 nets.
     assert_eq!(r.film.parts(), 16);
-    let quantile = 2.1314;
+    let quantile = student_quantile(0.05, 15.0) as f32;
     let readings = r.film.mean().into_iter().zip(r.film.standard_error());
     let held = readings
         .filter(|(mean, error)| (mean[0] - 2.0).abs() <= quantile * error[0])

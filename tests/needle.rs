@@ -10,8 +10,8 @@
 
 #[path = "../examples/pi/needle.rs"]
 mod needle;
-#[path = "../examples/pi/tail.rs"]
-mod tail;
+#[path = "common/statistics.rs"]
+mod statistics;
 
 use std::f64::consts::FRAC_PI_4;
 
@@ -19,13 +19,10 @@ use etendue::Error;
 use etendue::gpu::{Device, DeviceRequest};
 
 use needle::{Estimate, Estimator, MISTAKE, PRODUCT, SUM, SUM_BARE, Throws, UNIFORM};
-use tail::Tail;
+use statistics::{Tail, Z};
 
 /// Needles of each test.
 const LOG2: u32 = 24;
-
-/// Standard errors of the normal law that 1 in 10⁶ right estimates exceeds.
-const Z: f64 = 4.89;
 
 /// 2²⁴ needles under validation, or the printed reason why there are none.
 fn throw(estimator: Estimator) -> Option<(Throws, Estimate)> {
@@ -50,7 +47,7 @@ fn throw(estimator: Estimator) -> Option<(Throws, Estimate)> {
     Some((throws, estimate))
 }
 
-/// The mean is within 4.89 standard errors of the truth, with σ from the closed form, and
+/// The mean is within [`Z`] standard errors of the truth, with σ from the closed form, and
 /// therefore within `bound`, which is twice that: an estimator that is off by more than
 /// `bound` fails (1 − 10⁻⁶).
 fn assert_mean(estimator: Estimator, bound: f64) {

@@ -10,7 +10,7 @@ use etendue::settings::{BackendChoice, Settings, Strategy};
 use glam::{DVec3, Vec3};
 
 use crate::common::*;
-use crate::{Z, image_mean};
+use crate::statistics::Estimate;
 
 /// Relative error that is allowed, chance included.
 const DELTA: f64 = 5e-3;
@@ -19,11 +19,7 @@ fn assert_mean(what: &str, scene: &Scene, settings: &Settings, truth: f64) {
     let Some(r) = render(scene, settings, Tuning::default()) else {
         return;
     };
-    let (mean, error) = image_mean(&r.film);
-    assert!(
-        (mean - truth).abs() + Z * error <= DELTA * truth,
-        "{what}: {mean} ± {error}, not {truth}"
-    );
+    Estimate::of_image(&r.film).assert_is(what, truth, DELTA);
 }
 
 /// Irradiance of a polygon of radiance 1 on a point with normal n: half the sum

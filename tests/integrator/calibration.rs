@@ -1,17 +1,21 @@
 //! Standard errors are as large as errors: in many renders of one scene with
 //! other samples, pixels stray from the truth as often as they say.
 
+use etendue::compare::tails::student_quantile;
 use etendue::render::{Control, Tuning};
-use etendue::settings::{BackendChoice, Estimator, Settings};
+use etendue::settings::{BackendChoice, Estimator, Settings, Strategy};
 use glam::{DVec3, Vec3};
 
+use crate::closed::glowing_room;
 use crate::common::*;
+use crate::statistics::{Batches, FALSE_ALARM, Family, regions};
+use crate::tier::{count, is_night};
 
 /// Renders, each of so many samples that the standard error has seven degrees of freedom.
 const RENDERS: u64 = 64;
 const SAMPLES: u64 = 128;
-/// 97.5 % quantile of Student's t with 7 degrees of freedom, and with 127.
-const STUDENT: [(Estimator, f64); 2] = [(Estimator::Full, 2.3646), (Estimator::Textbook, 1.9788)];
+/// Degrees of freedom of standard errors: of nets of 16, and of samples.
+const DEGREES: [(Estimator, f64); 2] = [(Estimator::Full, 7.0), (Estimator::Textbook, 127.0)];
 
 #[test]
 fn intervals_hold_the_truth_as_often_as_they_say() {
@@ -26,7 +30,8 @@ fn intervals_hold_the_truth_as_often_as_they_say() {
     );
     scene.environment = constant_sky(0.3);
     scene.cameras = vec![pinhole(DVec3::new(1.0, 2.0, 5.0), DVec3::Y, 40.0)];
-    for (estimator, quantile) in STUDENT {
+    for (estimator, degrees) in DEGREES {
+        let quantile = student_quantile(0.05, degrees);
         let base = Settings {
             estimator,
             backend: BackendChoice::Bvh,
@@ -71,4 +76,58 @@ fn intervals_hold_the_truth_as_often_as_they_say() {
         assert!((0.93..0.97).contains(&share), "{share}");
         assert!((ratio - 1.0).abs() < 0.08, "{ratio}");
     }
+}
+
+/// Rooms whose radiance is known exactly, rendered in batches with seeds of their own: Student's t of every tile gives
+/// p-values that are uniform, and those against a truth that is off by 1 % are not.
+#[test]
+fn p_values_against_the_truth_are_uniform() {
+    const SIDE: usize = 64;
+    const TILE: usize = 8;
+    const STRATEGIES: [Strategy; 2] = [Strategy::Mis, Strategy::BsdfOnly];
+    let (albedos, strategies): (&[f32], _) = match is_night() {
+        true => (&[0.3, 0.5, 0.7, 0.9], &STRATEGIES[..]),
+        false => (&[0.7], &STRATEGIES[..1]),
+    };
+    let tiles = &regions(SIDE, TILE)[1..];
+    let whole = &regions(SIDE, TILE)[0].1;
+    let (mut family, mut wrong) = (Family::default(), Family::default());
+    for &albedo in albedos {
+        for estimator in [Estimator::Full, Estimator::Textbook] {
+            for &strategy in strategies {
+                let what = format!("{albedo} {} {strategy:?}", estimator.name());
+                let base = Settings {
+                    estimator,
+                    strategy,
+                    ..settings(SIDE as u32, 4)
+                };
+                let scene = glowing_room(albedo);
+                let Some(mut renderer) = open(&scene, &base, Tuning::default()) else {
+                    return;
+                };
+                let mut batches = Batches::default();
+                for batch in 0..count(64, 256) {
+                    // Other rooms have other numbers.
+                    let seed = family.len() as u64 * 1000 + batch + base.seed;
+                    renderer.restart(0..4, seed).unwrap();
+                    batches.push(&renderer.render(&mut |_| Control::Continue).unwrap());
+                }
+                let truth = 1.0 / (1.0 - f64::from(albedo));
+                assert!(!batches.tail(0).is_heavy(), "{what}: {:?}", batches.tail(0));
+                batches.estimate(whole, 0).assert_is(&what, truth, 1e-2);
+                for (tile, pixels) in tiles {
+                    let seen = batches.estimate(pixels, 0);
+                    family.add(format!("{what} {tile}"), seen.p(truth));
+                    wrong.add(String::new(), seen.p(1.01 * truth));
+                }
+            }
+        }
+    }
+    family.assert("tiles against the truth");
+    let (right, wrong) = (family.uniformity(), wrong.uniformity());
+    println!(
+        "{} p-values are uniform with p = {right:.3}, against a wrong truth {wrong:.0e}",
+        family.len()
+    );
+    assert!(right >= FALSE_ALARM && wrong < FALSE_ALARM);
 }

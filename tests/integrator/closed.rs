@@ -9,7 +9,7 @@ use crate::common::*;
 use crate::{BOTH, assert_mean, largest_deviation};
 
 /// The room −1 … 1 of `albedo` that emits 1 everywhere, seen from inside.
-fn glowing_room(albedo: f32) -> Scene {
+pub fn glowing_room(albedo: f32) -> Scene {
     let mut scene = empty();
     add(&mut scene, room(1.0), emitter(albedo, 1.0));
     let from = DVec3::new(0.3, -0.2, 0.9);

@@ -6,7 +6,8 @@ use etendue::settings::{BackendChoice, Estimator, Settings};
 use glam::{DVec3, Vec3};
 
 use crate::common::*;
-use crate::{BOTH, image_mean, largest_deviation};
+use crate::statistics::Estimate;
+use crate::{BOTH, largest_deviation};
 
 const RADIANCE: f32 = 3.7;
 
@@ -105,7 +106,7 @@ fn constant_sky_keeps_its_value_over_a_million_samples() {
         let off = largest_deviation(&r.film, truth);
         println!(
             "sky {radiance}: off {off:.1e}, mean {:.9}",
-            image_mean(&r.film).0
+            Estimate::of_image(&r.film).mean
         );
         // Twenty levels of a tree of equal numbers: each doubling is exact; one rounding at the end.
         assert!(off <= 1e-7, "{radiance}: off by {off:.1e}");

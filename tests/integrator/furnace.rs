@@ -6,7 +6,8 @@ use etendue::settings::Settings;
 use glam::DVec3;
 
 use crate::common::*;
-use crate::{BOTH, image_mean, largest_deviation};
+use crate::statistics::Estimate;
+use crate::{BOTH, largest_deviation};
 
 /// A white Lambert sphere under a sky of 1, seen whole and at its rim.
 fn white_sphere() -> [(&'static str, Scene); 2] {
@@ -68,7 +69,7 @@ fn white_metal_never_gains_and_a_mirror_loses_nothing() {
         let Some(r) = render(&scene, &settings(16, 256), Tuning::default()) else {
             return;
         };
-        let (mean, error) = image_mean(&r.film);
+        let Estimate { mean, error, .. } = Estimate::of_image(&r.film);
         println!("roughness {roughness}: {mean:.6} ± {error:.1e}");
         if roughness == 0.0 {
             // F = F0 = 1 and the lobe is chosen with certainty: roundings only.

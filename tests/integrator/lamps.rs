@@ -6,8 +6,8 @@ use etendue::settings::{Estimator, Settings};
 use glam::{DAffine3, DVec3, Vec3};
 
 use crate::common::*;
+use crate::statistics::Estimate;
 use crate::strategies::{Plan, agree};
-use crate::{Z, image_mean};
 
 /// Lamps of many shapes over a floor: spheres that share a mesh, one of them mirrored
 /// and stretched, a sheet that shines to both sides, and one that faces away.
@@ -142,12 +142,6 @@ fn points_of_light_add_up() {
         let Some(r) = render(&scene, &settings, Tuning::default()) else {
             return;
         };
-        let (mean, error) = image_mean(&r.film);
-        let off = (mean - truth).abs() + Z * error;
-        println!(
-            "{}: {mean:.6} ± {error:.6}, truth {truth:.6}",
-            estimator.name()
-        );
-        assert!(off <= 5e-3 * truth, "{mean} ± {error}, not {truth}");
+        Estimate::of_image(&r.film).assert_is(estimator.name(), truth, 5e-3);
     }
 }

@@ -10,7 +10,7 @@ use etendue::settings::{Estimator, Settings, Strategy};
 use glam::{DVec3, Vec3};
 
 use crate::common::*;
-use crate::{Z, image_mean};
+use crate::statistics::Estimate;
 
 /// What is compared; the first one is the reference.
 const VARIANTS: [(Strategy, Estimator); 4] = [
@@ -41,18 +41,15 @@ pub fn agree(name: &str, scene: &Scene, plan: &Plan, tuning: Tuning) {
         let Some(r) = render(scene, &settings, tuning) else {
             return;
         };
-        let (mean, error) = image_mean(&r.film);
+        let this = Estimate::of_image(&r.film);
         let what = format!("{name}, {strategy:?}, {estimator:?}");
-        println!("{what}: {mean:.6} ± {error:.6}");
-        let Some((mean0, error0)) = first else {
-            first = Some((mean, error));
+        println!("{what}: {:.6} ± {:.6}", this.mean, this.error);
+        let Some(other) = first else {
+            first = Some(this);
             continue;
         };
-        let difference: f64 = (mean - mean0).abs() + Z * error.hypot(error0);
-        assert!(
-            difference <= plan.delta * mean0,
-            "{what}: {mean} ± {error} and {mean0} ± {error0}"
-        );
+        let (off, bound) = this.off_from(other);
+        assert!(off + bound <= plan.delta, "{what}: {this:?} and {other:?}");
     }
 }
 

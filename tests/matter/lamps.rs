@@ -7,7 +7,7 @@ use etendue::settings::{Settings, Strategy};
 use glam::{DAffine3, DVec3, Vec3};
 
 use crate::common::*;
-use crate::{Z, block, channel_mean, glass, grey, sheet};
+use crate::{block, channel_mean, glass, grey, sheet};
 
 /// A floor, a lamp above it, and something between them.
 fn scene_with(between: Option<(Mesh, Material, DAffine3)>) -> Scene {
@@ -40,12 +40,10 @@ fn assert_counted_once(what: &str, scene: &Scene, samples: [u64; 3], delta: f64)
         };
         means.push(channel_mean(&r.film, 0));
     }
-    let (m, e) = means[0];
-    for ((other, error), strategy) in means[1..].iter().zip(&strategies[1..]) {
-        let (d, bound) = (
-            (other - m).abs() / m,
-            Z * (e * e + error * error).sqrt() / m,
-        );
+    let m = means[0].mean;
+    for (other, strategy) in means[1..].iter().zip(&strategies[1..]) {
+        let (d, bound) = other.off_from(means[0]);
+        let other = other.mean;
         println!("{what}: {m:.6}, {strategy:?} {other:.6}, off {d:.1e} ± {bound:.1e}");
         assert!(
             d + bound <= delta,

@@ -56,16 +56,10 @@ fn assert_transmits(what: &str, scene: &Scene, settings: &Settings, truth: f64) 
         return;
     };
     assert_eq!(r.report.ledger.interior_overflows, 0);
-    let (mean, error) = channel_mean(&r.film, 0);
-    let off = (mean - truth).abs();
-    println!(
-        "{what}: {mean:.6}, truth {truth:.6}, off {off:.1e} ± {:.1e}",
-        4.9 * error
-    );
-    assert!(
-        off + 4.9 * error <= 4e-3,
-        "{what}: {mean} instead of {truth}"
-    );
+    let seen = channel_mean(&r.film, 0);
+    let (mean, off, bound) = (seen.mean, (seen.mean - truth).abs(), seen.chance());
+    println!("{what}: {mean:.6}, truth {truth:.6}, off {off:.1e} ± {bound:.1e}");
+    assert!(off + bound <= 4e-3, "{what}: {mean} instead of {truth}");
 }
 
 /// Glass, liquid, glass; the liquid reaches `overlap` into the glass, which has priority.

@@ -96,8 +96,8 @@ fn half_space_is_chandrasekhars() {
         let Some(r) = render(&scene, &settings, Tuning::default()) else {
             return;
         };
-        let (mean, error) = channel_mean(&r.film, 0);
-        let (off, bound) = ((mean - truth).abs(), 4.9 * error);
+        let seen = channel_mean(&r.film, 0);
+        let (mean, off, bound) = (seen.mean, (seen.mean - truth).abs(), seen.chance());
         println!(
             "ϖ {albedo}, {degrees}°: {mean:.6}, truth {truth:.6}, off {off:.1e} ± {bound:.1e}"
         );

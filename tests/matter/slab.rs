@@ -61,8 +61,8 @@ fn assert_plate(backend: BackendChoice, n: f64, alpha_d: f64, degrees: f64, delt
             return;
         };
         let what = format!("{backend:?}, n {n}, αd {alpha_d}, {degrees}°, from above {from_above}");
-        let (mean, error) = channel_mean(&r.film, 0);
-        let (off, bound) = ((mean - truth).abs(), 4.9 * error);
+        let seen = channel_mean(&r.film, 0);
+        let (mean, off, bound) = (seen.mean, (seen.mean - truth).abs(), seen.chance());
         println!("{what}: {mean:.6}, truth {truth:.6}, off {off:.1e} ± {bound:.1e}");
         assert!(off + bound <= delta, "{what}: {mean} instead of {truth}");
     }

@@ -131,7 +131,7 @@ fn every_mutant_is_found_and_no_control() {
             .as_ref()
             .is_none_or(|names| names.split(',').any(|n| n == m.name))
     };
-    let binaries = binaries(&["mutants"]);
+    let binaries = binaries(&["mutants"], &[]);
     let compiler = shaderc::Compiler::new().unwrap();
     let nothing = tempfile::tempdir().unwrap();
     let mut healthy = BTreeMap::new();

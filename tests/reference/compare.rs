@@ -4,8 +4,8 @@ use etendue::render::Tuning;
 use etendue::scene::Scene;
 use etendue::settings::{BackendChoice, Settings};
 
-use crate::Z;
 use crate::common::{render, settings};
+use crate::statistics::{Estimate, regions};
 use crate::tracer::{Picture, Plan, picture};
 
 /// Both render frames of so many pixels a side …
@@ -42,24 +42,10 @@ impl Default for Comparison {
     }
 }
 
-/// Mean and squared standard error of a channel over pixels.
-fn average(p: &Picture, pixels: &[usize], channel: usize) -> (f64, f64) {
-    let n = pixels.len() as f64;
-    let mean = pixels.iter().map(|&i| p.mean[i][channel]).sum::<f64>() / n;
-    let variance = pixels.iter().map(|&i| p.variance[i][channel]).sum::<f64>();
-    (mean, variance / (n * n))
-}
-
-/// Names and pixels of the image and of its tiles.
-fn regions() -> Vec<(String, Vec<usize>)> {
-    let mut regions = vec![(String::from("image"), (0..SIDE * SIDE).collect())];
-    for (y, x) in (0..SIDE / TILE).flat_map(|y| (0..SIDE / TILE).map(move |x| (y, x))) {
-        let pixels = (0..TILE * TILE)
-            .map(|i| (y * TILE + i / TILE) * SIDE + x * TILE + i % TILE)
-            .collect();
-        regions.push((format!("tile ({x}, {y})"), pixels));
-    }
-    regions
+/// Mean of a channel over pixels.
+fn average(p: &Picture, pixels: &[usize], channel: usize) -> Estimate {
+    let of = |&i: &usize| (p.mean[i][channel], p.variance[i][channel].sqrt());
+    Estimate::of_pixels(pixels.iter().map(of))
 }
 
 /// The renderer's picture in the form of the reference's.
@@ -76,7 +62,7 @@ fn rendered(scene: &Scene, settings: &Settings) -> Option<Picture> {
 }
 
 /// Renders both ways and asserts that the means are equivalent: their difference
-/// plus [`Z`] standard errors (Welch) stays within the bounds.
+/// plus [`crate::statistics::Z`] standard errors (Welch) stays within the bounds.
 pub fn agree(what: &str, scene: &Scene, c: &Comparison) {
     let plan = Plan {
         side: SIDE as u32,
@@ -95,26 +81,27 @@ pub fn agree(what: &str, scene: &Scene, c: &Comparison) {
         let Some(ours) = rendered(scene, &settings) else {
             continue;
         };
-        for (region, pixels) in regions() {
+        for (region, pixels) in regions(SIDE, TILE) {
             let delta = if region == "image" { c.image } else { c.tile };
             for channel in 0..c.channels {
-                let (theirs, their_square) = average(&reference, &pixels, channel);
-                let (ours, our_square) = average(&ours, &pixels, channel);
-                let difference = ours - theirs;
-                let error = (their_square + our_square).sqrt();
+                let theirs = average(&reference, &pixels, channel);
+                let ours = average(&ours, &pixels, channel);
+                let difference = ours.minus(theirs);
                 let line = format!(
-                    "{what}, {backend:?}, {region}, channel {channel}: {ours:.6} ± {:.1e}, reference \
-                     {theirs:.6} ± {:.1e}: {:+.2} % ± {:.2} %, z {:+.1}, allowed {:.1} %",
-                    our_square.sqrt(),
-                    their_square.sqrt(),
-                    100.0 * difference / theirs,
-                    100.0 * Z * error / theirs,
-                    difference / error,
+                    "{what}, {backend:?}, {region}, channel {channel}: {:.6} ± {:.1e}, reference \
+                     {:.6} ± {:.1e}: {:+.2} % ± {:.2} %, z {:+.1}, allowed {:.1} %",
+                    ours.mean,
+                    ours.error,
+                    theirs.mean,
+                    theirs.error,
+                    100.0 * difference.mean / theirs.mean,
+                    100.0 * difference.chance() / theirs.mean,
+                    difference.mean / difference.error,
                     100.0 * delta,
                 );
                 println!("{line}");
                 // The same where both are black.
-                if difference.abs() + Z * error > delta * theirs {
+                if !difference.is_within(0.0, delta * theirs.mean) {
                     failures.push(line);
                 }
             }

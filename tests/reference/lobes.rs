@@ -7,6 +7,7 @@ use glam::{DVec3, Vec4};
 
 use crate::assert_is;
 use crate::common::{lambert, metal};
+use crate::statistics::Estimate;
 use crate::tracer::dielectric::{Interface, fresnel, solid, thin};
 use crate::tracer::microfacet::{density, g1, g2};
 use crate::tracer::rng::Rng;
@@ -61,7 +62,8 @@ fn compare(
         let mean = sum[0] / n;
         let error = ((sum[1] / n - mean * mean) / n).sqrt();
         let truth = integral(|w| value(w) * probe(w));
-        assert_is(&format!("{what}, probe {i}"), (mean, error), truth, 1e-2);
+        let seen = Estimate::new(mean, error);
+        assert_is(&format!("{what}, probe {i}"), seen, truth, 1e-2);
     }
 }
 

@@ -2,7 +2,7 @@
 //! compared with it.
 //!
 //! Every seed is fixed. Tests of chance are tests of equivalence: they pass only
-//! when the deviation plus [`Z`] standard errors stays inside the stated bound,
+//! when the deviation plus [`statistics::Z`] standard errors stays inside the stated bound,
 //! so that too few samples fail instead of passing.
 #![allow(
     clippy::unwrap_used,
@@ -13,6 +13,8 @@
 #[allow(dead_code, reason = "other test programs use the rest")]
 #[path = "../common/mod.rs"]
 mod common;
+#[path = "../common/statistics.rs"]
+mod statistics;
 mod tracer;
 
 mod compare;
@@ -24,32 +26,27 @@ mod opaque;
 mod scattering;
 
 use etendue::scene::Scene;
+use statistics::Estimate;
 use tracer::{Picture, Plan, picture};
 
-/// Standard errors between an estimate and what it is allowed to be: two-sided 1e-6.
-const Z: f64 = 4.9;
-
-/// Mean of a channel over the frame with its standard error.
-fn mean(p: &Picture, channel: usize) -> (f64, f64) {
-    let n = p.mean.len() as f64;
-    let sum: f64 = p.mean.iter().map(|v| v[channel]).sum();
-    let variance: f64 = p.variance.iter().map(|v| v[channel]).sum();
-    (sum / n, variance.sqrt() / n)
+/// Mean of a channel over the frame.
+fn mean(p: &Picture, channel: usize) -> Estimate {
+    let pixels = p.mean.iter().zip(&p.variance);
+    Estimate::of_pixels(pixels.map(|(m, v)| (m[channel], v[channel].sqrt())))
 }
 
 /// An estimate is `truth` within the bound `delta`, chance included.
-fn assert_is(what: &str, (mean, error): (f64, f64), truth: f64, delta: f64) {
-    let off = (mean - truth).abs();
-    let chance = Z * error;
+fn assert_is(what: &str, seen: Estimate, truth: f64, delta: f64) {
+    let Estimate { mean, error, .. } = seen;
     println!("{what}: {mean:.6} ± {error:.1e}, truth {truth:.6}, allowed {delta:.1e}");
     assert!(
-        off + chance <= delta,
+        seen.is_within(truth, delta),
         "{what}: {mean} ± {error} instead of {truth}"
     );
 }
 
 /// Means of the channels of a small frame; no path may be given up.
-fn traced(scene: &Scene, side: u32, samples: u32, channels: usize) -> Vec<(f64, f64)> {
+fn traced(scene: &Scene, side: u32, samples: u32, channels: usize) -> Vec<Estimate> {
     let plan = Plan {
         side,
         samples,

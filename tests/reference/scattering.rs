@@ -4,6 +4,7 @@ use etendue::scene::{Material, Medium, Phase, Scene, Volume};
 use glam::{DVec3, Vec3};
 
 use crate::common::*;
+use crate::statistics::Estimate;
 use crate::tracer::medium::deflect;
 use crate::tracer::rng::Rng;
 use crate::{assert_is, traced};
@@ -36,18 +37,6 @@ pub fn cuboid(half: Vec3) -> etendue::scene::Mesh {
     mesh
 }
 
-fn mean_of(count: u32, mut f: impl FnMut() -> f64) -> (f64, f64) {
-    let (mut sum, mut squares) = (0.0, 0.0);
-    for _ in 0..count {
-        let x = f();
-        sum += x;
-        squares += x * x;
-    }
-    let n = f64::from(count);
-    let mean = sum / n;
-    (mean, ((squares / n - mean * mean) / n).sqrt())
-}
-
 /// E[μ^k] of both phase functions: Rayleigh's are 2/5 and 9/35, Henyey and
 /// Greenstein's Legendre moments are g^k, so E[μ] = g and E[μ²] = (1 + 2g²)/3.
 #[test]
@@ -55,9 +44,10 @@ fn moments_of_phase_functions() {
     let axis = DVec3::new(0.48, -0.6, 0.64);
     let moment = |phase, power, seed| {
         let mut rng = Rng::new(&[seed]);
-        mean_of(1_000_000, || {
-            deflect(phase, axis, &mut rng).dot(axis).powi(power)
-        })
+        let cosines: Vec<f64> = (0..1_000_000)
+            .map(|_| deflect(phase, axis, &mut rng).dot(axis).powi(power))
+            .collect();
+        Estimate::of(cosines.into_iter())
     };
     for (power, truth) in [(1, 0.0), (2, 1.0 / 3.0), (4, 0.2)] {
         assert_is("isotropic", moment(Phase::Isotropic, power, 1), truth, 5e-3);

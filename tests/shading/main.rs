@@ -28,6 +28,7 @@ mod phase;
 mod random;
 mod samplers;
 mod scene;
+#[path = "../common/statistics.rs"]
 mod statistics;
 mod values;
 

@@ -6,7 +6,7 @@ use etendue::scene::absorption_of;
 use glam::Vec3;
 
 use crate::fixture::Rng;
-use crate::statistics::FALSE_ALARM;
+use crate::statistics::{Estimate, FALSE_ALARM, Family, Z, kolmogorov};
 use crate::{BIND_INPUT, BIND_OUTPUT, GROUP, Kernel, finish, open};
 
 const MEDIA: &str = "test_shading_media";
@@ -21,9 +21,6 @@ const APPROACH: u32 = 5;
 
 /// Draws that one invocation makes, one after the other.
 const EACH: usize = 16;
-
-/// Standard errors that a mean may be off.
-pub const ERRORS: f64 = 4.9;
 
 /// `Case` of the kernel.
 #[repr(C)]
@@ -55,32 +52,6 @@ pub fn draw(kernel: &Kernel, kind: u32, cases: &[Case], draws: usize, seed: u32)
         [count.div_ceil(GROUP * EACH) as u32, 1, 1],
     );
     output.read(count).unwrap()
-}
-
-/// Mean and its standard error.
-pub fn mean(values: impl Iterator<Item = f64> + Clone) -> (f64, f64) {
-    let n = values.clone().count() as f64;
-    let mean = values.clone().sum::<f64>() / n;
-    let square = values.map(|v| (v - mean).powi(2)).sum::<f64>();
-    (mean, (square / (n * (n - 1.0))).sqrt())
-}
-
-/// Kolmogorov's and Smirnov's distance times the root of the count, and its bound.
-fn kolmogorov(mut values: Vec<f32>, cdf: impl Fn(f64) -> f64, tests: f64) -> (f64, f64) {
-    values.sort_unstable_by(f32::total_cmp);
-    let n = values.len() as f64;
-    let mut largest = 0.0_f64;
-    for (i, &v) in values.iter().enumerate() {
-        let p = cdf(v.into());
-        largest = largest
-            .max((p - i as f64 / n).abs())
-            .max(((i + 1) as f64 / n - p).abs());
-    }
-    // The tail is 2 exp(−2 x²) to first order.
-    (
-        largest * n.sqrt(),
-        (0.5 * (2.0 * tests / FALSE_ALARM).ln()).sqrt(),
-    )
 }
 
 fn grey(sigma: f32, end: f32) -> Case {
@@ -151,15 +122,14 @@ fn free_flights_are_exponential() {
         assert!(flights.iter().all(|f| f[0] > 0.0 && f[1..] == [1.0; 3]));
         distances.extend(flights.iter().map(|f| f[0]));
     }
-    let tested = |rate: f64| kolmogorov(distances.clone(), |x| -(-rate * x).exp_m1(), 1.0);
-    let (d, bound) = tested(f64::from(sigma));
-    println!(
-        "free flights: √n D = {d:.3}, bound {bound:.3}, {} flights",
-        distances.len()
-    );
-    assert!(d < bound);
+    let tested = |rate: f64| kolmogorov(distances.clone(), |x| -(-rate * x).exp_m1());
+    let (d, p) = tested(f64::from(sigma));
+    let count = distances.len();
+    println!("free flights: √n D = {d:.3}, p = {p:.3}, {count} flights");
+    println!("p-value free flights {p:.6e}");
+    assert!(p >= FALSE_ALARM);
     // The test has teeth: an error of 0.3 % in the coefficient.
-    assert!(tested(1.003 * f64::from(sigma)).0 > bound);
+    assert!(tested(1.003 * f64::from(sigma)).1 < FALSE_ALARM);
 
     const SHARES: usize = 1 << 20;
     let depths = [1e-4_f32, 1e-3, 0.01, 0.1, 1.0, 3.0, 10.0, 20.0];
@@ -175,7 +145,7 @@ fn free_flights_are_exponential() {
             (share - p).abs() / error
         );
         assert!(
-            (share - p).abs() <= ERRORS * error + 1.0 / n,
+            (share - p).abs() <= Z * error + 1.0 / n,
             "{depth}: {share} instead of {p}"
         );
     }
@@ -237,15 +207,21 @@ fn chromatic_flights_have_the_means_of_each_channel() {
                         0.0
                     }
                 });
-                mean(weights)
+                Estimate::of(weights)
             };
             let (t, s) = (f64::from(case.sigma_t[k]), f64::from(case.sigma_s[k]));
             let left = (-t * f64::from(case.end)).exp();
             let share = if t > 0.0 { s / t * (1.0 - left) } else { 0.0 };
-            for ((got, error), wanted) in [(of(false), left), (of(true), share)] {
+            for (
+                Estimate {
+                    mean: got, error, ..
+                },
+                wanted,
+            ) in [(of(false), left), (of(true), share)]
+            {
                 let off = (got - wanted).abs();
                 // 1e-6: weights and ends are rounded; unlikely flights may not occur: one of them.
-                let allowed = ERRORS * error + 1e-6 * wanted + 4.0 * 3.0 / FLIGHTS as f64;
+                let allowed = Z * error + 1e-6 * wanted + 4.0 * 3.0 / FLIGHTS as f64;
                 assert!(
                     off <= allowed,
                     "{case:?} channel {k}: {got} instead of {wanted}, se {error:.1e}"
@@ -284,7 +260,7 @@ fn approaches_to_a_light_have_their_density() {
     }
     let all = draw(&kernel, APPROACH, &cases, DRAWS, 15);
     let (mut largest, mut worst, mut worst_sum) = (0.0_f64, 0.0_f64, 0.0_f64);
-    let mut bound = 0.0;
+    let mut family = Family::default();
     for (case, draws) in cases.iter().zip(all.chunks(DRAWS)) {
         let (d, to) = (
             Vec3::from(case.d).as_dvec3(),
@@ -297,14 +273,9 @@ fn approaches_to_a_light_have_their_density() {
         let whole = angle(end) - angle(0.0);
         let distances: Vec<f32> = draws.iter().map(|v| v[0]).collect();
         assert!(distances.iter().all(|t| (0.0..=case.end).contains(t)));
-        let (ks, limit) = kolmogorov(
-            distances,
-            |t| (angle(t) - angle(0.0)) / whole,
-            cases.len() as f64,
-        );
-        bound = limit;
+        let (ks, p) = kolmogorov(distances, |t| (angle(t) - angle(0.0)) / whole);
         largest = largest.max(ks);
-        assert!(ks < limit, "{case:?}: {ks}");
+        family.add(format!("{case:?}"), p);
         for v in draws {
             let wanted = apart / (whole * (apart * apart + (f64::from(v[0]) - closest).powi(2)));
             worst = worst.max((f64::from(v[1]) / wanted - 1.0).abs());
@@ -322,9 +293,8 @@ fn approaches_to_a_light_have_their_density() {
         let total = sum * end / NODES as f64;
         worst_sum = worst_sum.max((total - 1.0).abs());
     }
-    println!(
-        "approaches: √n D = {largest:.3}, bound {bound:.3}; pdf off by {worst:.1e}, ∫pdf − 1 {worst_sum:.1e}"
-    );
+    println!("approaches: √n D = {largest:.3}; pdf off by {worst:.1e}, ∫pdf − 1 {worst_sum:.1e}");
+    family.assert("approaches");
     // The distance from the light cancels: 1e-7 of 2 over 0.01.
     assert!(worst < 1e-4 && worst_sum < 1e-4);
     drop(kernel);

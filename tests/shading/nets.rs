@@ -6,13 +6,11 @@ use etendue::gpu::BindingKind;
 use etendue::layout::BLOCK_LEVEL;
 use etendue::spec::Spec;
 
-use crate::statistics::{Family, chi_square};
+use crate::statistics::{Estimate, Family, chi_square};
 use crate::{Kernel, finish, groups, open};
 
 const COUNT: usize = 1 << 20;
 const BLOCK: usize = 1 << BLOCK_LEVEL;
-/// One beyond normal quantiles: 1e-6 two-sided.
-const SIGMAS: f64 = 4.9;
 
 #[repr(C)]
 #[derive(Clone, Copy, Pod, Zeroable)]
@@ -130,16 +128,10 @@ fn blocks_are_independent_of_each_other() {
     close(kernel);
 }
 
-/// Mean of block means, its standard error, and the variance of a block mean.
-fn block_means(values: &[f64]) -> (f64, f64, f64) {
+/// Mean of the means of blocks.
+fn block_means(values: &[f64]) -> Estimate {
     let means = values.chunks_exact(BLOCK);
-    let means: Vec<f64> = means
-        .map(|b| b.iter().sum::<f64>() / BLOCK as f64)
-        .collect();
-    let count = means.len() as f64;
-    let mean = means.iter().sum::<f64>() / count;
-    let variance = means.iter().map(|m| (m - mean).powi(2)).sum::<f64>() / (count - 1.0);
-    (mean, (variance / count).sqrt(), variance)
+    Estimate::of(means.map(|b| b.iter().sum::<f64>() / BLOCK as f64))
 }
 
 #[test]
@@ -149,9 +141,10 @@ fn nets_integrate_without_bias_and_slots_do_not_go_together() {
     let b = draw(&kernel, 0, BLOCK, [1, 1]);
     let u = |d: &Draw, c: usize| f64::from(d.number[c]) - 0.5;
     let assert_zero = |name: &str, values: &[f64]| {
-        let (mean, error, variance) = block_means(values);
-        assert!(mean.abs() < SIGMAS * error, "{name}: {mean:e} +- {error:e}");
-        variance
+        let seen = block_means(values);
+        assert!(seen.mean.abs() < seen.chance(), "{name}: {seen:?}");
+        // of one block
+        seen.error.powi(2) * (seen.degrees + 1.0)
     };
     // ∫ (x − ½)(y − ½) = 0, with variance 1/144 for one sample.
     let independent = 1.0 / 144.0 / BLOCK as f64;

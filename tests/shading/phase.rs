@@ -5,8 +5,8 @@ use std::f64::consts::PI;
 use bytemuck::Zeroable;
 use glam::{DVec3, Vec3};
 
-use crate::media::{Case, ERRORS, PHASE, SCATTER, draw, kernel, mean};
-use crate::statistics::{Family, chi_square};
+use crate::media::{Case, PHASE, SCATTER, draw, kernel};
+use crate::statistics::{Estimate, Family, Z, chi_square};
 use crate::{finish, open};
 
 /// Of `layout.glsl`.
@@ -96,17 +96,22 @@ fn directions_have_the_moments_of_their_phase() {
         let second = |mu: &f64| 0.5 * (3.0 * mu * mu - 1.0);
         let checks = if case.phase == RAYLEIGH {
             vec![
-                ("μ", mean(cosines.iter().copied()), 0.0),
-                ("μ²", mean(cosines.iter().map(|mu| mu.powi(2))), 0.4),
-                ("μ⁴", mean(cosines.iter().map(|mu| mu.powi(4))), 9.0 / 35.0),
+                ("μ", Estimate::of(cosines.iter().copied()), 0.0),
+                ("μ²", Estimate::of(cosines.iter().map(|mu| mu.powi(2))), 0.4),
+                (
+                    "μ⁴",
+                    Estimate::of(cosines.iter().map(|mu| mu.powi(4))),
+                    9.0 / 35.0,
+                ),
             ]
         } else {
             vec![
-                ("μ", mean(cosines.iter().copied()), g),
-                ("P₂", mean(cosines.iter().map(second)), g * g),
+                ("μ", Estimate::of(cosines.iter().copied()), g),
+                ("P₂", Estimate::of(cosines.iter().map(second)), g * g),
             ]
         };
-        for (what, (got, error), wanted) in checks {
+        for (what, seen, wanted) in checks {
+            let (got, error) = (seen.mean, seen.error);
             let off = (got - wanted).abs();
             println!(
                 "phase {}, g {g}: E[{what}] = {got:.6}, {wanted:.6} wanted, {:.2} se",
@@ -114,7 +119,7 @@ fn directions_have_the_moments_of_their_phase() {
                 off / error
             );
             assert!(
-                off <= ERRORS * error + ROUNDING,
+                off <= Z * error + ROUNDING,
                 "{case:?} {what}: {got} instead of {wanted} ± {error:e}"
             );
         }

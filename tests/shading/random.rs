@@ -3,7 +3,7 @@
 use bytemuck::{Pod, Zeroable};
 use etendue::gpu::BindingKind;
 
-use crate::statistics::{Family, chi_square};
+use crate::statistics::{Family, Z, chi_square};
 use crate::{Kernel, finish, groups, open};
 
 const RANDOM: &str = "test_shading_random";
@@ -189,8 +189,8 @@ fn dimensions_pixels_samples_and_seeds_are_independent() {
     family.assert("independent");
 
     // Autocorrelation along samples and along pixels at 64 lags.
-    // |ρ| > 4.9/√N has probability 1e-6 each, 5e-4 for all 512.
-    let bound = 4.9 / (COUNT as f64).sqrt();
+    // |ρ| > Z/√N has probability 1e-6 each, 5e-4 for all 512.
+    let bound = Z / (COUNT as f64).sqrt();
     let mut worst = 0.0_f64;
     for x in &first {
         let along_samples: Vec<f64> = x.iter().map(|&u| f64::from(u) - 0.5).collect();

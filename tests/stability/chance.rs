@@ -8,7 +8,8 @@ use glam::{DVec3, Vec3};
 
 use crate::common::*;
 use crate::solids::{block, glass, grey};
-use crate::support::{error_of, mean_of};
+use crate::statistics::Family;
+use crate::support::Estimate;
 use crate::tier::count;
 
 /// A plane under half a sky: every pixel has the same mean, and a variance of its own.
@@ -31,10 +32,12 @@ fn picture(scene: &Scene, side: u32, samples: std::ops::Range<u64>, seed: u64) -
     Some(render(scene, &settings, Tuning::default())?.film)
 }
 
-/// Two-sided p of a normal deviate, by a bound that errs by a hundredth.
+/// A normal deviate is not beyond chance.
 fn is_likely(what: &str, z: f64) {
     println!("{what}: {z:.2} standard deviations");
-    assert!(z.abs() <= 4.9, "{what}: {z}");
+    let mut family = Family::default();
+    family.add(format!("{z:.2} deviations"), Estimate::new(z, 1.0).p(0.0));
+    family.assert(what);
 }
 
 /// Variance of the means of tiles of 2, 4, 8 and 16 pixels a side: σ²/n if pixels are independent.
@@ -115,7 +118,7 @@ fn long_paths_do_not_run_out_of_numbers() {
     let Some(r) = render(&scene, &settings(16, count(64, 1024)), Tuning::default()) else {
         return;
     };
-    let (off, bound) = ((mean_of(&r.film) - 1.0).abs(), 4.9 * error_of(&r.film));
+    let (off, bound) = Estimate::of_image(&r.film).off(1.0);
     let events = r.report.rays as f64 / r.report.paths as f64;
     println!("{events:.0} rays a path: off by {off:.1e} ± {bound:.1e}");
     assert!(events > 1000.0);
@@ -132,14 +135,12 @@ fn sample_numbers_pass_two_to_the_32() {
         let Some(film) = picture(&scene, 32, first..first + 64, 3) else {
             return;
         };
-        means.push((mean_of(&film), error_of(&film)));
+        means.push(Estimate::of_image(&film));
     }
-    for (i, (b, eb)) in means.iter().enumerate().skip(1) {
-        let (a, ea) = means[0];
-        assert_ne!(a, *b);
-        is_likely(
-            &format!("range {i} against the first"),
-            (b - a) / ea.hypot(*eb),
-        );
+    for (i, b) in means.iter().enumerate().skip(1) {
+        assert_ne!(means[0].mean, b.mean);
+        let difference = b.minus(means[0]);
+        let z = difference.mean / difference.error;
+        is_likely(&format!("range {i} against the first"), z);
     }
 }

@@ -19,6 +19,8 @@ mod random;
 #[path = "../common/solids.rs"]
 #[expect(dead_code, reason = "tests/matter uses the rest")]
 mod solids;
+#[path = "../common/statistics.rs"]
+mod statistics;
 #[path = "../common/tier.rs"]
 mod tier;
 

@@ -7,7 +7,7 @@ use glam::{DVec3, Vec3};
 
 use crate::common::*;
 use crate::solids::{block, glass, grey};
-use crate::support::{error_of, mean_of};
+use crate::support::{Estimate, largest_difference, mean_of};
 use crate::tier::count;
 
 /// The mean over a slope of light reflected by a metal of roughness √α does not jump where the lobe becomes a mirror.
@@ -31,13 +31,13 @@ fn narrowing_lobes_go_over_into_a_mirror() {
         let Some(r) = render(&scene, &settings, Tuning::default()) else {
             return;
         };
-        let (mean, error) = (mean_of(&r.film), error_of(&r.film));
-        println!("α {alpha:e}: {mean:.6} ± {:.1e}", 4.9 * error);
-        values.push((alpha, mean, error));
+        let seen = Estimate::of_image(&r.film);
+        println!("α {alpha:e}: {:.6} ± {:.1e}", seen.mean, seen.chance());
+        values.push((alpha, seen));
     }
-    let (_, mirror, _) = values[values.len() - 1];
-    for (alpha, mean, error) in &values {
-        let (off, bound) = ((mean / mirror - 1.0).abs(), 4.9 * error / mirror);
+    let mirror = values[values.len() - 1].1.mean;
+    for (alpha, seen) in &values {
+        let (mean, (off, bound)) = (seen.mean, seen.off(mirror));
         if *alpha <= 2e-3 {
             println!("α {alpha:e}: off by {off:.1e} ± {bound:.1e} of the mirror");
             assert!(off + bound <= 1e-3, "α {alpha}: {mean} and {mirror}");
@@ -78,16 +78,13 @@ fn denormal_numbers_are_zeros() {
     };
     let Some(zero) = picture(0.0) else { return };
     let tiny = picture(TINY).unwrap();
-    let (a, b) = (mean_of(&zero.film), mean_of(&tiny.film));
-    let (off, bound) = (
-        (b / a - 1.0).abs(),
-        4.9 * error_of(&zero.film).hypot(error_of(&tiny.film)) / a,
-    );
-    println!("numbers of {TINY:e}: off by {off:.1e} ± {bound:.1e}");
-    assert!(off + bound <= 1e-2, "{b} instead of {a}");
+    let off = largest_difference(&tiny.film, &zero.film);
+    println!("numbers of {TINY:e}: pixels off by {off:.1e} at most");
+    assert!(off == 0.0, "{off}");
 }
 
-/// A thousand plates that touch are one plate.
+/// Plates that touch are one plate, but for the offset o of the ray at each boundary: along the normal, so that the ray
+/// goes on beside its line and meets the next face o sin²θ/cosθ early. Plates 18 m wide have o = 4e-6.
 #[test]
 fn many_touching_plates_absorb_as_one() {
     let plates = count(64, 1000);
@@ -111,7 +108,8 @@ fn many_touching_plates_absorb_as_one() {
     let truth = (-1.0 / 30f64.to_radians().cos()).exp();
     let off = (mean_of(&many.film) / truth - 1.0).abs();
     println!("{plates} plates that touch: off by {off:.1e}");
-    assert!(off <= 1e-3, "{} instead of {truth}", mean_of(&many.film));
+    let bound = 1.5e-6 * plates as f64;
+    assert!(off <= bound, "{} instead of {truth}", mean_of(&many.film));
 }
 
 /// Batches of paths with a thousand scatterings: none is long enough for a system to reset the device.

@@ -68,6 +68,22 @@ fn parsed(log: &str) -> BTreeMap<String, (Outcome, String)> {
 }
 
 impl Results {
+    /// Runs the tests of the feature `faults` among these. They need a program that has it too, which lies where the
+    /// others look for theirs: so they run first.
+    fn with_faults(&mut self, cases: &[&'static Case]) {
+        let all = cases.iter().flat_map(|case| case.evidence);
+        let tests = all
+            .map(|e| e.test)
+            .filter(|test| test.starts_with("faults::"));
+        for (i, test) in tests.enumerate() {
+            if i == 0 {
+                self.binaries = binaries(&["faults"], &["faults"]);
+            }
+            self.of(test);
+        }
+        self.binaries = binaries(&[], &[]);
+    }
+
     fn of(&mut self, test: &'static str) -> &(Outcome, String) {
         let binaries = &self.binaries;
         self.done.entry(test.to_owned()).or_insert_with(|| {
@@ -181,12 +197,14 @@ fn every_case_is_measured() {
     };
     let log =
         std::env::var_os("ETENDUE_STABILITY_LOG").map(|p| std::fs::read_to_string(p).unwrap());
+    let cases: Vec<_> = table::cases().filter(is_chosen).collect();
     let mut results = Results {
-        binaries: binaries(&[]),
+        binaries: BTreeMap::new(),
         done: parsed(&log.unwrap_or_default()),
     };
+    results.with_faults(&cases);
     let (mut new, mut wrong) = (BTreeMap::new(), Vec::new());
-    for case in table::cases().filter(is_chosen) {
+    for case in cases {
         let (row, is_right) = measure(case, &mut results);
         new.insert(case.id, row);
         if !is_right {

@@ -9,6 +9,7 @@ use etendue::settings::{BackendChoice, Settings};
 use glam::{DVec3, Vec3};
 
 pub use crate::random::Random;
+pub use crate::statistics::Estimate;
 
 /// The two intersection tests.
 pub const BOTH: [BackendChoice; 2] = [BackendChoice::Bvh, BackendChoice::RayQuery];
@@ -22,18 +23,7 @@ impl Random {
 
 /// Mean over pixels and channels.
 pub fn mean_of(film: &Film) -> f64 {
-    let values: f64 = film.mean().iter().flatten().map(|v| f64::from(*v)).sum();
-    values / (3 * film.pixels()) as f64
-}
-
-/// Its standard error; the channels of a pixel are taken as one.
-pub fn error_of(film: &Film) -> f64 {
-    let variance: f64 = film
-        .standard_error()
-        .iter()
-        .map(|e| f64::from(e[0].max(e[1]).max(e[2])).powi(2))
-        .sum();
-    variance.sqrt() / film.pixels() as f64
+    Estimate::of_image(film).mean
 }
 
 /// Largest difference of pixels, relative to the brighter one or to a hundredth of the mean.

@@ -12,6 +12,8 @@
 
 #[path = "../common/random.rs"]
 mod random;
+#[path = "../common/statistics.rs"]
+mod statistics;
 
 mod brute;
 mod furnace;

@@ -10,6 +10,7 @@ use etendue::settings::{BackendChoice, Settings};
 use glam::DVec3;
 
 use crate::brute::{Brute, T_TOLERANCE, check, origin};
+use crate::statistics::largest_of;
 use crate::{BACKENDS, Levels, finish, open, render};
 
 const WIDTH: u32 = 64;
@@ -18,8 +19,6 @@ const HEIGHT: u32 = 48;
 const PROBED: (u32, u32) = (160, 128);
 /// Rays whose ids may differ, as a share: those on edges.
 const MOST_OTHER_IDS: f64 = 1e-4;
-/// Chance that any tile of a pair of pictures is taken for different when they are not.
-const FAMILY_WISE: f64 = 1e-3;
 const TILE: u32 = 8;
 
 /// Rays through the centres of pixels from the first camera, relative to the scene's origin.
@@ -56,28 +55,6 @@ pub fn primary_rays(scene: &Scene, (width, height): (u32, u32)) -> Vec<ProbeRay>
         .collect()
 }
 
-/// Chance that a normal variable is further from its mean than z > 0 deviations, by the continued fraction of
-/// Mills' ratio; good to 1e-6 of itself for z > 3, where it is used.
-fn two_sided(z: f64) -> f64 {
-    let fraction = (1..=40).rev().fold(z, |f, k| z + f64::from(k) / f);
-    2.0 * (-0.5 * z * z).exp() / (2.0 * std::f64::consts::PI).sqrt() / fraction
-}
-
-/// Deviations that none of `count` normal variables exceeds but with the chance [`FAMILY_WISE`] (Šidák).
-fn bound(count: usize) -> f64 {
-    let each = 1.0 - (1.0 - FAMILY_WISE).powf(1.0 / count as f64);
-    let (mut low, mut high) = (3.0, 20.0);
-    for _ in 0..60 {
-        let middle = 0.5 * (low + high);
-        if two_sided(middle) > each {
-            low = middle;
-        } else {
-            high = middle;
-        }
-    }
-    high
-}
-
 /// Tile means of two pictures against their standard errors; returns the largest deviation. The samples are the same
 /// on both sides, so equal pictures stay far below the bound: it is missed by a bias only.
 pub fn assert_same_picture(label: &str, a: &Film, b: &Film, (width, height): (u32, u32)) -> f64 {
@@ -86,7 +63,7 @@ pub fn assert_same_picture(label: &str, a: &Film, b: &Film, (width, height): (u3
     let errors = [a.standard_error(), b.standard_error()];
     let brightest = means[0].iter().flatten().fold(0f32, |m, &v| m.max(v));
     assert!(brightest > 0.0, "{label}: black");
-    let limit = bound((tiles_x * tiles_y * 3) as usize);
+    let limit = largest_of((tiles_x * tiles_y * 3) as usize);
     let mut worst = 0f64;
     for (tile, channel) in (0..tiles_x * tiles_y).flat_map(|t| [(t, 0), (t, 1), (t, 2)]) {
         let (mut difference, mut variance, mut sum) = (0.0, 0.0, 0.0);
