@@ -34,14 +34,18 @@ pub fn has_test(name: &str) -> bool {
     places.iter().any(|p| text_below(p).contains(&function))
 }
 
-/// Test binaries by name, built with these features: those named, or all.
+/// Test binaries by name, built with these features: those named (`etendue` is the library), or all.
 pub fn binaries(features: &[&str], names: &[&str]) -> BTreeMap<String, PathBuf> {
     let cargo = std::env::var_os("CARGO").expect("run by cargo");
+    let target = |name: &&str| match *name {
+        "etendue" => vec![String::from("--lib")],
+        name => vec![String::from("--test"), name.to_owned()],
+    };
     let arguments = "test --release --locked --no-run --message-format=json";
     let built = Command::new(cargo)
         .args(arguments.split(' '))
         .args(features.iter().flat_map(|f| ["--features", f]))
-        .args(names.iter().flat_map(|name| ["--test", name]))
+        .args(names.iter().flat_map(target))
         .current_dir(root())
         .stderr(Stdio::inherit())
         .output()

@@ -166,3 +166,41 @@ fn every_call_of_a_render_by_ray_query_may_fail() {
 fn every_call_of_a_render_by_the_pipeline_may_fail() {
     every_call_fails_cleanly(BackendChoice::RayPipeline);
 }
+
+/// Lets each call of these names fail, in a render of several submissions; returns how many there are.
+fn each_fails_cleanly(names: &[&str], manners: &[Manner]) -> Option<usize> {
+    if !has_device() {
+        return None;
+    }
+    let scene = cornell();
+    let whole = render(&scene, BackendChoice::Bvh, 0, Manner::Once);
+    assert_eq!(whole.messages, Vec::<String>::new());
+    let (mut count, mut longest) = (0, Duration::ZERO);
+    for (i, call) in whole.calls.iter().enumerate() {
+        if !names.contains(call) {
+            continue;
+        }
+        for &manner in manners {
+            let ending = render(&scene, BackendChoice::Bvh, i as u64 + 1, manner);
+            longest = longest.max(ending.delay);
+            check(i as u64 + 1, manner, &whole, &ending);
+        }
+        count += 1;
+    }
+    println!("each of {count} calls of {names:?} failed: an error within {longest:.1?}");
+    assert!(longest < LIMIT, "{longest:?}");
+    Some(count)
+}
+
+#[test]
+fn the_device_may_be_lost_at_every_submission() {
+    let count = each_fails_cleanly(&["vkQueueSubmit", "vkWaitForFences"], &[Manner::Lost]);
+    assert!(count.is_none_or(|n| n >= 6), "{count:?}");
+}
+
+#[test]
+fn every_allocation_of_the_device_may_fail() {
+    let names = ["vkAllocateMemory", "vkCreateBuffer", "vkMapMemory"];
+    let count = each_fails_cleanly(&names, &[Manner::Once, Manner::Lasting]);
+    assert!(count.is_none_or(|n| n >= 6), "{count:?}");
+}

@@ -4,7 +4,7 @@
 //! page as they are; `ETENDUE_NIGHTLY=1` takes the counts of the night where tests have some. `ETENDUE_STABILITY_LOG`, what
 //! `cargo test -- --nocapture` with `RUST_TEST_THREADS=1` wrote: tests that are in it are not run again.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write;
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
@@ -71,17 +71,18 @@ impl Results {
     /// Runs the tests of the feature `faults` among these. They need a program that has it too, which lies where the
     /// others look for theirs: so they run first.
     fn with_faults(&mut self, cases: &[&'static Case]) {
-        let all = cases.iter().flat_map(|case| case.evidence);
-        let tests = all
-            .map(|e| e.test)
-            .filter(|test| test.starts_with("faults::"));
-        for (i, test) in tests.enumerate() {
-            if i == 0 {
-                self.binaries = binaries(&["faults"], &["faults"]);
-            }
+        const FEATURE: &str = "faults";
+        let binary = |test: &'static str| test.split("::").next().unwrap();
+        let all = cases.iter().flat_map(|case| case.evidence).map(|e| e.test);
+        let (with, without): (Vec<_>, Vec<_>) = all.partition(|test| binary(test) == FEATURE);
+        if !with.is_empty() {
+            self.binaries = binaries(&[FEATURE], &[FEATURE]);
+        }
+        for test in with {
             self.of(test);
         }
-        self.binaries = binaries(&[], &[]);
+        let names: BTreeSet<_> = without.into_iter().map(binary).collect();
+        self.binaries = binaries(&[], &Vec::from_iter(names));
     }
 
     fn of(&mut self, test: &'static str) -> &(Outcome, String) {

@@ -70,7 +70,7 @@ pub const ACCUMULATION: &[Case] = &[
     Case {
         id: "G7",
         what: "Denormals are flushed",
-        expected: "FLT_MIN/2 in materials, media and lamps: the picture of zeros",
+        expected: "FLT_MIN/2 in materials, media and lamps: the picture of zeros, to the bit",
         verdict: Holds,
         evidence: &[line(
             "stability::numbers::denormal_numbers_are_zeros",

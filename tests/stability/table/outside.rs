@@ -19,17 +19,30 @@ pub const PROCESS: &[Case] = &[
         id: "I2",
         what: "Device lost in the middle",
         expected: "clean end at every submission, the checkpoint loads",
-        verdict: Open("a device that is lost is an error; nothing injects it yet"),
-        evidence: &[],
+        verdict: Holds,
+        evidence: &[
+            line(
+                "faults::vulkan::the_device_may_be_lost_at_every_submission",
+                "each of",
+            ),
+            passes("faults::program::a_lost_device_loses_no_finished_sample"),
+        ],
     },
     Case {
         id: "I3",
         what: "Out of memory of device or host",
         expected: "the k-th allocation fails: one error, nothing leaked",
         verdict: Wider(
-            "a budget that is too small is an error; the k-th allocation is not made to fail",
+            "of the device; memory of the host is asked for before it is taken, and its k-th allocation is not made to fail",
         ),
-        evidence: &[passes("gpu::buffers::exhausted_memory_is_an_error")],
+        evidence: &[
+            line(
+                "faults::vulkan::every_allocation_of_the_device_may_fail",
+                "each of",
+            ),
+            passes("gpu::buffers::exhausted_memory_is_an_error"),
+            passes("work::memory::what_has_no_room_is_refused_with_the_figure"),
+        ],
     },
     Case {
         id: "I4",
