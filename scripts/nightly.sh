@@ -4,7 +4,7 @@
 # should find it, the pages that tests write. Goes on after a failure, and ends with
 # what it proved and what it could not.
 #
-#   scripts/nightly.sh [stage…]     of: suite fuzz fresh stability mutants; all of them if none is named
+#   scripts/nightly.sh [stage…]     of: suite fuzz fresh farm stability mutants; all of them if none is named
 #   ETENDUE_SEED=N                  seed of the stage `fresh`; else another one each night
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
@@ -47,6 +47,7 @@ fresh_seed() {
     ETENDUE_NIGHTLY=0 ETENDUE_SEED="$seed" \
         cargo test --release --locked --no-fail-fast --test integrator --test matter --test reference --test stability
 }
+farms() { scripts/farm.sh; }
 pages() { ETENDUE_STABILITY_LOG="$log" scripts/stability.sh; }
 every_mutant() { ETENDUE_NIGHTLY=0 ETENDUE_MUTANTS_ALL=1 scripts/mutants.sh; }
 fuzzing() { ETENDUE_FUZZ_SEED="$((seed % 2147483647 + 1))" scripts/fuzz.sh; }
@@ -55,7 +56,7 @@ unchanged() {
 }
 
 stages=("$@")
-(($# > 0)) || stages=(suite fuzz fresh stability mutants)
+(($# > 0)) || stages=(suite fuzz fresh farm stability mutants)
 printf 'nightly.sh: seed %s, stages: %s\n' "$seed" "${stages[*]}"
 for name in "${stages[@]}"; do
     case "$name" in
@@ -65,6 +66,7 @@ for name in "${stages[@]}"; do
             ;;
         fuzz) stage "a million damaged files of every kind do no harm" fuzzing ;;
         fresh) stage "the pictures of known answers hold for seed $seed" fresh_seed ;;
+        farm) stage "Slurm and Open Job Description give the picture of one run, with a task killed on the way" farms ;;
         stability) stage "every case of docs/stability.md is measured and written" pages ;;
         mutants) stage "every planted error is found, and no control; docs/physics.md is written" every_mutant ;;
         *) printf 'nightly.sh: no stage %s\n' "$name" >&2; exit 2 ;;
