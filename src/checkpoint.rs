@@ -7,8 +7,6 @@
 //! whether there are sums of the first hit, log₂ of the samples of a block (u32 each); the nodes (count u32, then
 //! for each its first sample u64, level u32 and floats); SHA-256 of all before.
 
-mod lock;
-
 use std::fs::File;
 use std::io::{self, BufReader, BufWriter, Read, Write};
 use std::path::Path;
@@ -19,8 +17,6 @@ use crate::error::{Error, Result};
 use crate::film::Film;
 use crate::image_io::{Metadata, Value, write_with};
 use crate::settings::{Crop, MAX_SIDE};
-
-pub use lock::{Lock, lock};
 
 /// Of every checkpoint; the last byte counts up when the format changes.
 const MAGIC: [u8; 16] = *b"etendue\0chkpt\0\0\x02";

@@ -45,7 +45,7 @@ pub enum Error {
         /// What it is there and here.
         what: String,
     },
-    /// A checkpoint that another process is writing.
+    /// A file that another process is going to write.
     #[error("{} is in use by another render; wait for it or name another file", path.display())]
     Busy {
         /// The file.

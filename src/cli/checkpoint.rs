@@ -3,9 +3,9 @@
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
-use etendue::checkpoint::{self, Lock};
+use etendue::checkpoint;
 use etendue::film::Film;
-use etendue::image_io::{Metadata, probe_writable};
+use etendue::image_io::Metadata;
 use etendue::render::{Ledger, Progress, Report, Work};
 use etendue::{Error, Result};
 
@@ -18,14 +18,6 @@ use super::identity::{DEVICE, JOB, check, number};
 const THROUGHPUT: &str = "work.truncated_throughput";
 const RAYS: &str = "work.rays";
 
-/// A checkpoint file to write to.
-pub struct Opened {
-    /// None of devices and pipes, which have no place beside them.
-    _lock: Option<Lock>,
-    /// What was in it.
-    pub saved: Option<Saved>,
-}
-
 /// A checkpoint that was read.
 pub struct Saved {
     path: PathBuf,
@@ -34,24 +26,12 @@ pub struct Saved {
     pub film: Film,
 }
 
-/// Finds out before the work whether checkpoints can be written, keeps others from it, and
-/// reads the one to go on from.
-pub fn open(args: &RenderArgs) -> Result<Opened, Failure> {
-    let mut opened = Opened {
-        _lock: None,
-        saved: None,
+/// Reads the checkpoint to go on from. It is locked already: somebody may have finished one
+/// before.
+pub fn open(args: &RenderArgs) -> Result<Option<Saved>, Failure> {
+    let Some(path) = args.checkpoint.as_ref().filter(|path| path.exists()) else {
+        return Ok(None);
     };
-    let Some(path) = &args.checkpoint else {
-        return Ok(opened);
-    };
-    probe_writable(path).map_err(Failure::usage)?;
-    if !path.exists() || path.is_file() {
-        opened._lock = Some(checkpoint::lock(path).map_err(Failure::usage)?);
-    }
-    // somebody may have finished one before it was locked here
-    if !path.exists() {
-        return Ok(opened);
-    }
     if !args.resume {
         let what = format!(
             "{} is there; --resume goes on from it, removing it starts anew",
@@ -62,8 +42,7 @@ pub fn open(args: &RenderArgs) -> Result<Opened, Failure> {
     }
     let (header, film) = checkpoint::read(path).map_err(Failure::usage)?;
     let path = path.clone();
-    opened.saved = Some(Saved { path, header, film });
-    Ok(opened)
+    Ok(Some(Saved { path, header, film }))
 }
 
 impl Saved {

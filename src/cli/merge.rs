@@ -4,7 +4,9 @@ use std::ops::Range;
 use std::path::{Path, PathBuf};
 
 use etendue::film::Film;
-use etendue::image_io::{Aov, Format, Image, Metadata, Value, probe_writable, read_exr, write_exr};
+use etendue::image_io::{
+    Aov, Format, Image, Metadata, Value, lock, probe_writable, read_exr, write_exr,
+};
 use etendue::{Error, Result};
 
 use super::args::MergeArgs;
@@ -37,6 +39,7 @@ pub fn run(args: &MergeArgs) -> Result<Outcome, Failure> {
         }));
     }
     probe_writable(&args.output).map_err(Failure::usage)?;
+    let _lock = lock(&args.output).map_err(Failure::usage)?;
     let (film, mut shards) = gather(&args.shards).map_err(Failure::usage)?;
     // so that the header does not depend on the order either
     shards.sort_by_key(|shard| shard.held.first().map(|range| range.start));

@@ -4,7 +4,9 @@ use std::path::Path;
 use std::time::Instant;
 
 use etendue::film::Film;
-use etendue::image_io::{Format, Image, probe_writable, write_bytes, write_exr, write_png};
+use etendue::image_io::{
+    Format, Image, Lock, lock, probe_writable, write_bytes, write_exr, write_png,
+};
 use etendue::render::{Control, Progress, Report, Team, Work};
 use etendue::scene::{Environment, Scene, gltf, load_environment};
 use etendue::{Error, Result};
@@ -31,10 +33,9 @@ pub fn run(args: &RenderArgs) -> Result<Outcome, Failure> {
 /// As [`run`]; with a header, the samples of that one, and only if everything is as it says.
 pub fn repeat(args: &RenderArgs, repeats: Option<&Repeat>) -> Result<Outcome, Failure> {
     let start = Instant::now();
-    check_outputs(args)?;
-    // held until the last checkpoint is written
-    let mut opened = checkpoint::open(args)?;
-    let saved = opened.saved.take();
+    // held until the last file is written
+    let _locks = claim_outputs(args)?;
+    let saved = checkpoint::open(args)?;
     let interrupt = Interrupt::install()?;
     let mut reporter = Reporter::new(args);
     let job = prepare(args, repeats, start)?;
@@ -142,8 +143,8 @@ fn begin(
     Ok((empty, Work::default()))
 }
 
-/// Finds out before the work whether its result can be written.
-fn check_outputs(args: &RenderArgs) -> Result<(), Failure> {
+/// Finds out before the work whether its results can be written, and keeps others from doing so.
+fn claim_outputs(args: &RenderArgs) -> Result<Vec<Lock>, Failure> {
     for path in &args.output {
         let format = Format::of(path).map_err(Failure::usage)?;
         if format == Format::Png && !args.output.iter().any(|p| is_exr(p)) && !args.aov.is_empty() {
@@ -153,10 +154,19 @@ fn check_outputs(args: &RenderArgs) -> Result<(), Failure> {
             }));
         }
     }
-    for path in args.output.iter().chain(&args.stats) {
+    let mut locks: Vec<Lock> = Vec::new();
+    let others = args.stats.iter().chain(&args.checkpoint);
+    for path in args.output.iter().chain(others) {
         probe_writable(path).map_err(Failure::usage)?;
+        if locks.iter().any(|lock| lock.is_of(path)) {
+            return Err(Failure::usage(Error::Settings {
+                name: "--output",
+                what: format!("{} is named twice", path.display()),
+            }));
+        }
+        locks.extend(lock(path).map_err(Failure::usage)?);
     }
-    Ok(())
+    Ok(locks)
 }
 
 fn is_exr(path: &Path) -> bool {

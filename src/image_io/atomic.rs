@@ -71,12 +71,12 @@ pub fn probe_writable(path: &Path) -> Result<()> {
 }
 
 /// Whether the path leads to a device, pipe or socket: replacing `/dev/null` by a file would do harm.
-fn is_special(path: &Path) -> bool {
+pub(super) fn is_special(path: &Path) -> bool {
     fs::metadata(path).is_ok_and(|meta| !meta.is_file() && !meta.is_dir())
 }
 
 /// The file that a symbolic link stands for; the path itself otherwise.
-fn resolve(path: &Path) -> PathBuf {
+pub(super) fn resolve(path: &Path) -> PathBuf {
     match fs::read_link(path) {
         // a link to nowhere: create what it points to
         Ok(link) => fs::canonicalize(path).unwrap_or_else(|_| folder(path).join(link)),
@@ -84,7 +84,7 @@ fn resolve(path: &Path) -> PathBuf {
     }
 }
 
-fn folder(path: &Path) -> &Path {
+pub(super) fn folder(path: &Path) -> &Path {
     match path.parent() {
         Some(parent) if parent != Path::new("") => parent,
         _ => Path::new("."),

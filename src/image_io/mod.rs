@@ -3,6 +3,7 @@
 
 mod atomic;
 mod exr;
+mod lock;
 mod nodes;
 mod png;
 mod tone;
@@ -12,6 +13,7 @@ use std::path::Path;
 
 pub use atomic::{probe_writable, write_bytes, write_with};
 pub use exr::{read_exr, write_exr};
+pub use lock::{Lock, lock};
 pub use png::write_png;
 pub use tone::Tone;
 

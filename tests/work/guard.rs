@@ -56,31 +56,101 @@ fn the_second_render_on_a_checkpoint_is_refused() {
     assert!(!left.iter().any(|name| name.ends_with(".lock")), "{left:?}");
 }
 
-/// Each output is one of the two pictures, whole.
+/// Under any name, by a render or a merge, at the start; what was killed is in nobody's way.
 #[test]
-fn two_renders_to_one_output_leave_one_whole_picture() {
+fn the_second_render_to_one_output_is_refused() {
+    if !has_device() {
+        return;
+    }
+    let folder = scene();
+    let path = |name: &str| folder.path().join(name);
+    render(&folder, "-o shard.exr --width 16 --samples 0..2");
+    fs::create_dir(path("sub")).unwrap();
+    let mut names = vec!["a.exr", "./a.exr", "sub/../a.exr"];
+    if cfg!(unix) {
+        std::os::unix::fs::symlink("a.exr", path("other.exr")).unwrap();
+        names.push("other.exr");
+    }
+    // with and without an older picture
+    for old in [None, Some("old")] {
+        if let Some(text) = old {
+            fs::write(path("a.exr"), text).unwrap();
+        }
+        let line = "-o a.exr --stats s.json --width 16";
+        let mut child = start(&folder, &format!("{line} --spp 100000000"));
+        let refused = |line: &str, name: &str| {
+            let output = etendue(line, folder.path());
+            let message = stderr(&output);
+            assert_eq!(output.status.code(), Some(2), "{line}: {message}");
+            let is_named = message.contains("in use") && message.contains(name);
+            assert!(is_named, "{line}: {message}");
+        };
+        for name in &names {
+            refused(&format!("render scene.gltf -o b.exr -o {name}"), name);
+            refused(&format!("merge shard.exr -o {name}"), name);
+        }
+        refused("render scene.gltf -o b.exr --stats s.json", "s.json");
+        assert!(!path("b.exr").exists());
+        // others are in nobody's way
+        render(&folder, "-o c.exr --width 16 --spp 1");
+        child.kill().unwrap();
+        child.wait().unwrap();
+        assert_eq!(fs::read_to_string(path("a.exr")).ok().as_deref(), old);
+        render(&folder, &format!("{line} --spp 1"));
+        read(&folder, "a.exr");
+        let left = list(folder.path());
+        assert!(!left.iter().any(|name| name.ends_with(".lock")), "{left:?}");
+    }
+}
+
+/// Which of them is refused is by chance; the picture is that of the other one, whole.
+#[test]
+fn two_renders_to_one_output_at_once_leave_one_whole_picture() {
     if !has_device() {
         return;
     }
     let folder = scene();
     let line =
         |seed: u64| format!("render scene.gltf -o a.exr --width 32 --spp 8 --seed {seed} -q");
-    let pictures: Vec<_> = [1, 2]
-        .map(|seed| {
-            assert!(etendue(&line(seed), folder.path()).status.success());
-            read(&folder, "a.exr")
-        })
-        .into();
+    let pictures = [1, 2].map(|seed| {
+        assert!(etendue(&line(seed), folder.path()).status.success());
+        read(&folder, "a.exr")
+    });
     for _ in 0..3 {
-        let both = [1, 2].map(|seed| command(&line(seed), folder.path()).spawn().unwrap());
-        for mut child in both {
-            assert!(child.wait().unwrap().success());
-        }
+        let quiet = |seed| {
+            command(&line(seed), folder.path())
+                .stderr(Stdio::null())
+                .spawn()
+        };
+        let both = [1, 2].map(|seed| quiet(seed).unwrap());
+        let codes = both.map(|mut child| child.wait().unwrap().code().unwrap());
+        assert!(
+            codes.contains(&0) && codes.iter().all(|c| [0, 2].contains(c)),
+            "{codes:?}"
+        );
         let left = read_exr(&folder.path().join("a.exr")).unwrap();
-        let is_one = |picture: &etendue::image_io::Image| picture.channels == left.channels;
-        assert!(pictures.iter().any(is_one));
+        let mut done = pictures.iter().zip(codes).filter(|(_, code)| *code == 0);
+        assert!(done.any(|(picture, _)| picture.channels == left.channels));
         assert_eq!(list(folder.path()), ["a.exr", "scene.gltf"]);
     }
+}
+
+/// Files that a command line would write twice are refused; names that begin alike are others.
+#[test]
+fn outputs_are_named_once() {
+    if !has_device() {
+        return;
+    }
+    let folder = scene();
+    for line in ["-o a.exr -o ./a.exr", "-o a.exr --checkpoint a.exr"] {
+        let output = etendue(&format!("render scene.gltf {line}"), folder.path());
+        let message = stderr(&output);
+        assert_eq!(output.status.code(), Some(2), "{line}: {message}");
+        assert!(message.contains("a.exr is named twice"), "{message}");
+    }
+    let long = "n".repeat(100);
+    let line = format!("-o {long}1.exr -o {long}2.exr -o {long}1.png --width 8 --spp 1");
+    render(&folder, &line);
 }
 
 /// The scene is read once, at the start: the picture and its header are of what was read.
