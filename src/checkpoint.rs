@@ -10,6 +10,7 @@
 use std::fs::File;
 use std::io::{self, BufReader, BufWriter, Read, Write};
 use std::path::Path;
+use std::thread::{self, ScopedJoinHandle};
 
 use sha2::{Digest, Sha256};
 
@@ -23,6 +24,9 @@ const MAGIC: [u8; 16] = *b"etendue\0chkpt\0\0\x02";
 /// Bytes of a SHA-256.
 const DIGEST: u64 = 32;
 
+/// Bytes of floats that are converted at a time.
+const PART: usize = 1 << 16;
+
 const TEXT: u8 = 0;
 const NUMBER: u8 = 1;
 
@@ -32,17 +36,32 @@ const NUMBER: u8 = 1;
 /// [`Error::Io`]; an older checkpoint is then intact.
 pub fn write(path: &Path, header: &Metadata, film: &Film) -> Result<()> {
     write_with(path, &mut |file| {
-        let mut to = Summing {
-            inner: BufWriter::new(file),
-            sum: Sha256::new(),
-        };
-        to.write_all(&MAGIC)?;
-        write_header(&mut to, header)?;
-        write_film(&mut to, film)?;
-        let sum = to.sum.finalize();
-        to.inner.write_all(&sum)?;
-        to.inner.flush()
+        let mut to = BufWriter::new(file);
+        // summed up beside the writing: each takes about as long
+        let sum = thread::scope(|scope| {
+            let summing = thread::Builder::new().spawn_scoped(scope, || checksum(header, film));
+            write_content(&mut to, header, film)?;
+            match summing.map(ScopedJoinHandle::join) {
+                Ok(Ok(sum)) => sum,
+                // no thread to be had
+                _ => checksum(header, film),
+            }
+        })?;
+        to.write_all(&sum)?;
+        to.flush()
     })
+}
+
+fn checksum(header: &Metadata, film: &Film) -> io::Result<[u8; DIGEST as usize]> {
+    let mut to = Summing(Sha256::new());
+    write_content(&mut to, header, film)?;
+    Ok(to.0.finalize().into())
+}
+
+fn write_content(to: &mut dyn Write, header: &Metadata, film: &Film) -> io::Result<()> {
+    to.write_all(&MAGIC)?;
+    write_header(to, header)?;
+    write_film(to, film)
 }
 
 /// Reads a checkpoint. Nothing larger than the file is allocated, whatever it claims.
@@ -95,11 +114,13 @@ fn write_film(to: &mut dyn Write, film: &Film) -> io::Result<()> {
     for (first, level, values) in film.nodes() {
         to.write_all(&first.to_le_bytes())?;
         write_u32(to, level)?;
-        let mut bytes = Vec::new();
-        for part in values.chunks(1 << 14) {
-            bytes.clear();
-            bytes.extend(part.iter().flat_map(|value| value.to_le_bytes()));
-            to.write_all(&bytes)?;
+        let mut bytes = [0; PART];
+        for part in values.chunks(PART / 4) {
+            let bytes = &mut bytes[..part.len() * 4];
+            for (bytes, value) in bytes.chunks_exact_mut(4).zip(part) {
+                bytes.copy_from_slice(&value.to_le_bytes());
+            }
+            to.write_all(bytes)?;
         }
     }
     Ok(())
@@ -180,21 +201,17 @@ fn bad(what: &str) -> io::Error {
     io::Error::new(io::ErrorKind::InvalidData, what)
 }
 
-/// Passes bytes on and sums them up.
-struct Summing<W> {
-    inner: W,
-    sum: Sha256,
-}
+/// Sums bytes up.
+struct Summing(Sha256);
 
-impl<W: Write> Write for Summing<W> {
+impl Write for Summing {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-        let count = self.inner.write(bytes)?;
-        self.sum.update(&bytes[..count]);
-        Ok(count)
+        self.0.update(bytes);
+        Ok(bytes.len())
     }
 
     fn flush(&mut self) -> io::Result<()> {
-        self.inner.flush()
+        Ok(())
     }
 }
 
@@ -245,7 +262,7 @@ impl<R: Read> Source<R> {
         let bytes = count.checked_mul(4).ok_or_else(|| bad("it ends early"))?;
         self.claim(bytes)?;
         let mut values = Vec::with_capacity(count as usize);
-        let mut buffer = [0; 1 << 14];
+        let mut buffer = [0; PART];
         let mut left = bytes as usize;
         while left > 0 {
             let part = left.min(buffer.len());

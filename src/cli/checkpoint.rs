@@ -92,6 +92,15 @@ impl Saved {
     }
 }
 
+/// What checkpoints took during a render; the last one comes after it.
+#[derive(Clone, Copy, Default)]
+pub struct Cost {
+    /// How many were written.
+    pub count: u64,
+    /// For which the render waited.
+    pub time: Duration,
+}
+
 /// Writes checkpoints at an interval.
 pub struct Keeper<'a> {
     path: &'a Path,
@@ -99,6 +108,8 @@ pub struct Keeper<'a> {
     last: Instant,
     job: &'a Job<'a>,
     report: Report,
+    /// So far.
+    pub cost: Cost,
 }
 
 impl<'a> Keeper<'a> {
@@ -113,6 +124,7 @@ impl<'a> Keeper<'a> {
             last: Instant::now(),
             job,
             report: report.clone(),
+            cost: Cost::default(),
         })
     }
 
@@ -121,6 +133,7 @@ impl<'a> Keeper<'a> {
         if !progress.pass_complete || self.last.elapsed() < self.interval {
             return Ok(());
         }
+        let start = Instant::now();
         let Work {
             rays,
             seconds,
@@ -138,6 +151,8 @@ impl<'a> Keeper<'a> {
         };
         let result = save(self.path, &record);
         self.last = Instant::now();
+        self.cost.count += u64::from(result.is_ok());
+        self.cost.time += self.last - start;
         result
     }
 }

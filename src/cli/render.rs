@@ -12,7 +12,7 @@ use etendue::scene::{Environment, Scene, gltf, load_environment};
 use etendue::{Error, Result};
 
 use super::args::RenderArgs;
-use super::checkpoint::{self, Keeper, Saved};
+use super::checkpoint::{self, Cost, Keeper, Saved};
 use super::failure::{Failure, Outcome};
 use super::header::{self, Job, Record, Stop};
 use super::interrupt::Interrupt;
@@ -57,7 +57,8 @@ pub fn repeat(args: &RenderArgs, repeats: Option<&Repeat>) -> Result<Outcome, Fa
 
     interrupt.begin_rendering();
     let rendered = render(&mut renderer, &job, film, work, &interrupt, &mut reporter);
-    let (film, stop) = rendered.map_err(|error| rescue(error, &mut renderer, &job, &reporter))?;
+    let (film, stop, cost) =
+        rendered.map_err(|error| rescue(error, &mut renderer, &job, &reporter))?;
     interrupt.begin_writing();
     reporter.clear();
     let report = renderer.report();
@@ -78,7 +79,7 @@ pub fn repeat(args: &RenderArgs, repeats: Option<&Repeat>) -> Result<Outcome, Fa
         return Ok(Outcome::Interrupted);
     }
     warn_about(&record, &reporter);
-    let finished = finish(&record, &reporter, start);
+    let finished = finish(&record, cost, &reporter, start);
     saved.and(finished)?;
     check_dropped(&record)?;
     Ok(match stop {
@@ -250,7 +251,7 @@ fn render(
     before: Work,
     interrupt: &Interrupt,
     reporter: &mut Reporter,
-) -> Result<(Film, Stop)> {
+) -> Result<(Film, Stop, Cost)> {
     let samples = job.samples();
     let mut stop = Stop::Samples;
     let mut keeper = Keeper::new(job, &renderer.report());
@@ -274,7 +275,8 @@ fn render(
     if film.missing(&samples).is_empty() {
         stop = Stop::Samples;
     }
-    Ok((film, stop))
+    let cost = keeper.map_or_else(Cost::default, |keeper| keeper.cost);
+    Ok((film, stop, cost))
 }
 
 /// Keeps what was finished before a render failed, if there is a checkpoint to keep it in.
@@ -369,7 +371,7 @@ fn check_dropped(record: &Record) -> Result<(), Failure> {
 }
 
 /// Writes every file, the remaining ones also when one fails.
-fn finish(record: &Record, reporter: &Reporter, start: Instant) -> Result<(), Failure> {
+fn finish(record: &Record, cost: Cost, reporter: &Reporter, start: Instant) -> Result<(), Failure> {
     let writing = Instant::now();
     let args = record.job.args;
     let mut image = Image::from_film(record.film, &args.aovs(), record.metadata())?;
@@ -393,6 +395,7 @@ fn finish(record: &Record, reporter: &Reporter, start: Instant) -> Result<(), Fa
     let late = stats::LateTimes {
         write: writing.elapsed().as_secs_f64(),
         total: start.elapsed().as_secs_f64(),
+        checkpoints: cost,
     };
     for path in &written {
         tracing::info!("wrote {}", path.display());

@@ -4,6 +4,7 @@ use etendue::image_io::Value;
 use etendue::render::Memory;
 use serde_json::{Map, Number, Value as Json, json};
 
+use super::checkpoint::Cost;
 use super::header::Record;
 
 /// Changes when a name is changed or removed; additions do not count.
@@ -15,6 +16,8 @@ pub struct LateTimes {
     pub write: f64,
     /// From the start of the program.
     pub total: f64,
+    /// Of the time of the render, what checkpoints took.
+    pub checkpoints: Cost,
 }
 
 /// The object: everything that stands in the header, nested at the dots, and more.
@@ -41,6 +44,8 @@ pub fn statistics(record: &Record, late: &LateTimes) -> Json {
     root.insert("features".into(), on.collect());
     root["times"]["write"] = late.write.into();
     root["times"]["total"] = late.total.into();
+    root["times"]["checkpoints"] = late.checkpoints.time.as_secs_f64().into();
+    root.insert("checkpoints".into(), late.checkpoints.count.into());
     let rate = |count: u64| {
         let rate = count as f64 / report.times.render;
         if rate.is_finite() { rate } else { 0.0 }

@@ -4,6 +4,7 @@
 #![allow(clippy::unwrap_used, reason = "a step that fails fails the test")]
 #![allow(clippy::print_stderr, reason = "a test that is skipped says so")]
 
+mod cost;
 mod damage;
 mod disk;
 mod growth;
