@@ -15,8 +15,8 @@ readonly MESA_VERSION=24.1 # the first lavapipe with ray queries
 readonly CACHE="${XDG_CACHE_HOME:-$HOME/.cache}/etendue"
 
 # g++ brings the linker and the C++ library that libshaderc needs; SPIRV-Tools are
-# for the tests and for the static shaderc below.
-readonly PACKAGES=(g++ ca-certificates libvulkan1 vulkan-validationlayers libshaderc-dev spirv-tools)
+# for the tests and for the static shaderc below, strace is for the tests.
+readonly PACKAGES=(g++ ca-certificates libvulkan1 vulkan-validationlayers libshaderc-dev spirv-tools strace)
 
 say() { printf 'setup: %s\n' "$*" >&2; }
 die() { say "$@"; exit 1; }

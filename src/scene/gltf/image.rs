@@ -40,6 +40,12 @@ pub(super) fn decode(
     check_size(width, height, longest_side)?;
     let size = u64::from(width) * u64::from(height);
     check_total(size, texels.0, texels.1)?;
+    if size > most_pixels(bytes, format) {
+        return Err(format!(
+            "claims {width} × {height} pixels, which {} bytes cannot hold",
+            bytes.len()
+        ));
+    }
 
     // The decoder's own allocations, for bombs in other places than the pixels:
     // sixteen-bit RGBA twice over, and a fixed sum for tables and metadata.
@@ -57,6 +63,29 @@ pub(super) fn decode(
         height,
         texels: to_texels(decoded, color_space),
     })
+}
+
+/// The most pixels that an image of so many bytes can have: its decoder takes the memory for all
+/// of them before it finds that they are not there.
+fn most_pixels(bytes: &[u8], format: ImageFormat) -> u64 {
+    // deflate needs two bits for 258 bytes
+    const DEFLATE: u64 = 1032;
+    // a block of 8 × 8 takes one bit at least, that of its mean
+    const JPEG: u64 = 64;
+    let bits = bytes.len() as u64 * 8;
+    if format == ImageFormat::Jpeg {
+        return bits.saturating_mul(JPEG);
+    }
+    // bits of a channel and kind of pixels, which the header has after the size
+    let at = |i: usize| bytes.get(i).copied().unwrap_or(0);
+    let (depth, kind) = (u64::from(at(24)).max(1), at(25));
+    let channels = match kind {
+        2 => 3,
+        4 => 2,
+        6 => 4,
+        _ => 1,
+    };
+    bits.saturating_mul(DEFLATE) / (depth * channels)
 }
 
 /// Whether a JPEG has its end. The decoder paints what is missing grey.
