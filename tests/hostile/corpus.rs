@@ -13,12 +13,15 @@ use super::pictures::pictures;
 /// A word in a file outside, which no message may hold.
 pub const SECRET: &str = "correcthorsebatterystaple";
 
+/// Writes a case: into the scene's folder, and beside it.
+type Write = dyn Fn(&Path, &Path);
+
 pub struct Case {
     pub name: &'static str,
     /// What the message holds.
     pub says: &'static str,
     /// Writes `scene.gltf` and what it needs into the first folder; the second is outside.
-    pub write: Box<dyn Fn(&Path, &Path)>,
+    pub write: Box<Write>,
 }
 
 /// A 2 × 1 map in Radiance format.
@@ -248,7 +251,7 @@ fn special() -> Vec<Case> {
             fs::write(scene.join("scene.gltf"), with_buffer("socket").to_gltf()).unwrap();
         }),
         case("a pipe as scene", says, |scene, _| {
-            make_pipe(&scene.join("scene.gltf"))
+            make_pipe(&scene.join("scene.gltf"));
         }),
         case("a folder as scene", says, |scene, _| {
             fs::create_dir(scene.join("scene.gltf")).unwrap();
