@@ -30,7 +30,9 @@ pub const INTEGRATOR: &[Case] = &[
         id: "D2",
         what: "A depth limit loses ρ^{m+1}",
         expected: "the series for m = 0 … 32, exact; what was cut is counted",
-        verdict: Wider("exact until roulette begins, with a quarter of the throughput, then 1 % with chance"),
+        verdict: Wider(
+            "exact until roulette begins, with a quarter of the throughput, then 1 % with chance",
+        ),
         evidence: &[
             largest("integrator::closed::closed_room_sums_the_series", "off "),
             line(
