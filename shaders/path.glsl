@@ -19,8 +19,10 @@
 
 // Roulette starts after this many scattering events: short paths carry most of the light …
 const uint ROULETTE_START = 2u;
-// … and thins the paths whose throughput is less than this, which is what survivors then have.
+// … and thins the paths whose throughput is less than this, which is what survivors then have. Random walks
+// in media are long and each step brings little: thinned harder, they take less time for the same error.
 const float ROULETTE_WEIGHT = 0.25;
+const float ROULETTE_WEIGHT_MEDIUM = 1.0;
 // From here on survival at event n is at most 1 − 2/n, so that light that nothing
 // absorbs ends with probability one, after twice as many events on average. The
 // weight keeps the mean. Random walks in white media are rarely this long …
@@ -79,10 +81,10 @@ void path_leave(inout PathState path, SurfacePoint s, vec3 origin, vec3 directio
     path.lead = HAS_MEDIA ? dot(origin - s.position, direction) : 0.0;
 }
 
-// Roulette by throughput; false when the path ends. What is left has its weight.
-bool path_survives(inout PathState path, float u)
+// Roulette by throughput, which is kept at `weight` or above; false when the path ends. What is left has its weight.
+bool path_survives(inout PathState path, float weight, float u)
 {
-    float survival = path.depth >= ROULETTE_START ? min(max_component(path.beta) / ROULETTE_WEIGHT, 1.0) : 1.0;
+    float survival = path.depth >= ROULETTE_START ? min(max_component(path.beta) / weight, 1.0) : 1.0;
     if (path.depth >= LONG_PATH) {
         survival = min(survival, 1.0 - 2.0 / float(path.depth));
     }
@@ -158,7 +160,7 @@ bool path_scatter(inout PathState path, inout PathResult result, float end)
     path.flight = flight;
     path.depth++;
     path.chain = 0u;
-    path.is_alive = path_survives(path, u.w);
+    path.is_alive = path_survives(path, ROULETTE_WEIGHT_MEDIUM, u.w);
     return true;
 }
 
@@ -334,7 +336,7 @@ void path_surface(inout PathState path, inout PathResult result, SurfacePoint s,
     path.depth += path.is_sensor ? 0u : 1u;
     path.is_sensor = false;
     path.chain = next.pdf > 0.0 ? 0u : path.chain + 1u;
-    path.is_alive = (next.is_transmitted ? side < 0.0 : side > 0.0) && path_survives(path, u.w);
+    path.is_alive = (next.is_transmitted ? side < 0.0 : side > 0.0) && path_survives(path, ROULETTE_WEIGHT, u.w);
     path.pdf = next.pdf;
     path.can_be_sampled = next.pdf > 0.0;
     path.scattered_at = s.position;

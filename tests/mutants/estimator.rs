@@ -57,7 +57,7 @@ pub const MUTANTS: &[Mutant] = &[
         wrong: "survival is the square of the throughput",
         file: "shaders/path.glsl",
         edits: &[(
-            "min(max_component(path.beta) / ROULETTE_WEIGHT, 1.0) : 1.0;",
+            "min(max_component(path.beta) / weight, 1.0) : 1.0;",
             "square(min(max_component(path.beta), 1.0)) : 1.0;",
         )],
         killers: &["integrator::closed::closed_room_sums_the_series"],
