@@ -52,8 +52,8 @@ LightSample light_sample_triangle(Light light, vec3 from, vec2 u, float choice)
     vec3 front = ((light.material & LIGHT_MIRRORED) != 0u ? -cross_edges : cross_edges) / doubled_area;
     s.wi = to * inversesqrt(distance2);
     float cosine = -dot(front, s.wi);
-    // The ray stops short of the emitter by the bound on the error of its points.
-    vec3 magnitude = abs(light.position) + abs(light.edge1) + abs(light.edge2);
+    // The ray stops short of the emitter by the bound on the error of its points and, by `to`, on that of the ray's end.
+    vec3 magnitude = abs(light.position) + abs(light.edge1) + abs(light.edge2) + abs(to);
     s.target = offset_origin(point, surface_error(magnitude, light.edge1, light.edge2), cosine > 0.0 ? front : -front);
     uint index = light.material & TRIANGLE_MATERIAL_MASK;
     bool is_lit = cosine > 0.0 || (cosine < 0.0 && (light.material & LIGHT_DOUBLE_SIDED) != 0u);

@@ -3,6 +3,7 @@
 
 use std::borrow::Cow;
 use std::ffi::{CStr, c_char, c_void};
+use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 
 use ash::vk;
@@ -54,6 +55,23 @@ pub(super) struct Instance {
     entry: ash::Entry,
 }
 
+/// Holds the driver, and the layer where validation is on, in this process: the loader unloads them with the last
+/// instance that needs them, and NVIDIA's driver (580.159, under validation) could not be loaded a 31st time. A process that
+/// makes one instance pays nothing for this; with the second, one more is made and never destroyed.
+fn keep_loaded(info: &vk::InstanceCreateInfo<'_>, validation: bool) {
+    static STARTED: [AtomicUsize; 2] = [const { AtomicUsize::new(0) }; 2];
+    if STARTED[usize::from(validation)].fetch_add(1, Ordering::Relaxed) != 1 {
+        return;
+    }
+    // SAFETY: the loader that was found a moment ago, never unloaded from here on.
+    if let Ok(entry) = unsafe { ash::Entry::load() } {
+        // SAFETY: all pointers in `info` outlive the call.
+        // Where it fails, all goes on as without it.
+        let _ = unsafe { entry.create_instance(info, None) };
+        std::mem::forget(entry);
+    }
+}
+
 impl Instance {
     pub(super) fn new(validation: bool) -> Result<Self> {
         // SAFETY: the platform's Vulkan loader is trusted to be one; it stays loaded as long as `entry` lives.
@@ -98,6 +116,7 @@ impl Instance {
             .application_info(&application)
             .enabled_layer_names(&layers)
             .enabled_extension_names(&extensions);
+        keep_loaded(&info, validation);
         if validation {
             // The messenger in the chain hears vkCreateInstance and vkDestroyInstance themselves.
             info = info.push_next(&mut messenger_info).push_next(&mut features);

@@ -103,8 +103,9 @@ const FUNCTIONS: [Function; 8] = [
         },
         truth: |x, _| x.ln(),
         unit: Unit::Ulp,
-        bound: 3.0,
-        promise: "error ≤ 3 ulp",
+        // (half a unit more than Vulkan's 3: the truth here is not rounded to a float first. An H100 needs 3.10)
+        bound: 3.5,
+        promise: "error ≤ 3 ulp of the nearest float",
     },
     Function {
         name: "division",

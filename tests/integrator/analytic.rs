@@ -9,6 +9,7 @@ use etendue::scene::{Environment, Scene};
 use etendue::settings::{BackendChoice, Settings, Strategy};
 use glam::{DVec3, Vec3};
 
+use crate::ALL;
 use crate::common::*;
 use crate::statistics::Estimate;
 
@@ -53,6 +54,44 @@ fn polygon_light_obeys_lamberts_formula_at_every_height() {
             .push(parallel(eye, at, 1e-3 * f64::from(height)));
         let truth = 5.0 * lambert_polygon(&corners, at, DVec3::Y) / PI;
         assert_mean(&format!("{height} m"), &scene, &settings(32, 1024), truth);
+    }
+}
+
+/// Shadow rays from afar end with an error that grows with their length. They must not meet
+/// the lamp that they aim at, even where it is seen nearly edge-on.
+#[test]
+fn far_lamps_are_not_in_their_own_shadow() {
+    let normal = Vec3::new(0.48, 0.6, 0.64);
+    let along = Vec3::new(0.8, -0.6, 0.0).cross(normal).normalize();
+    for distance in [13.0, 1000.0] {
+        for cosine in [0.5_f32, 0.005] {
+            let towards = cosine * normal + (1.0 - cosine * cosine).sqrt() * along;
+            let mut scene = empty();
+            let light = square(Vec3::ZERO, normal, 0.5);
+            let corners: Vec<DVec3> = light.positions.iter().map(|p| p.as_dvec3()).collect();
+            add(&mut scene, light, emitter(0.0, 5.0));
+            add(
+                &mut scene,
+                square(distance * towards, -towards, 0.1),
+                lambert(1.0),
+            );
+            let at = f64::from(distance) * towards.as_dvec3();
+            scene
+                .cameras
+                .push(parallel(at - towards.as_dvec3(), at, 1e-2));
+            let truth = 5.0 * lambert_polygon(&corners, at, -towards.as_dvec3()) / PI;
+            for backend in ALL {
+                let settings = Settings {
+                    backend,
+                    ..settings(16, 64)
+                };
+                let what = format!("{} at {distance} m, cosine {cosine}", backend.name());
+                let Some(r) = render(&scene, &settings, Tuning::default()) else {
+                    return;
+                };
+                Estimate::of_image(&r.film).assert_is(&what, truth, 1e-3);
+            }
+        }
     }
 }
 

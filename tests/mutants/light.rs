@@ -205,6 +205,13 @@ pub const MUTANTS: &[Mutant] = &[
         killers: &["traversal::gap::inside_of_the_gap_is_dark"],
     },
     Mutant {
+        name: "shadow-end",
+        wrong: "the bound on the error of a shadow ray's end leaves out its length",
+        file: "shaders/lights.glsl",
+        edits: &[(" + abs(light.edge2) + abs(to);", " + abs(light.edge2);")],
+        killers: &["integrator::analytic::far_lamps_are_not_in_their_own_shadow"],
+    },
+    Mutant {
         name: "offset-small",
         wrong: "the bound on a hit point's error is 160 times too small",
         file: "shaders/surface.glsl",
