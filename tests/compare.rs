@@ -119,7 +119,7 @@ impl Samples {
             backend: BackendChoice::Bvh,
             ..Settings::default()
         };
-        let required = std::env::var_os("ETENDUE_REQUIRE_DEVICE").is_some_and(|v| v == "1");
+        let required = std::env::var_os("ETENDUE_REQUIRE_DEVICE").is_some();
         match Renderer::new(scene, &settings, &DeviceOptions::default()) {
             Ok(renderer) => Some(Self { renderer, next: 0 }),
             Err(error @ Error::Unsupported { .. }) if !required => {

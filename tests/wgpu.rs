@@ -34,7 +34,7 @@ fn renderer(scene: &str, backend: BackendChoice) -> Option<Renderer> {
         aovs: true,
         ..Settings::default()
     };
-    let required = std::env::var_os("ETENDUE_REQUIRE_DEVICE").is_some_and(|value| value == "1");
+    let required = std::env::var_os("ETENDUE_REQUIRE_DEVICE").is_some();
     match Renderer::new(&scene, &settings, &DeviceOptions::default()) {
         Ok(renderer) => Some(renderer),
         Err(error @ Error::Unsupported { .. }) if !required => {

@@ -45,7 +45,7 @@ pub(super) fn open(
     let reason = match (&caps.ray_query, &caps.ray_pipeline) {
         (Ok(()), _) => String::from("ray query on a CPU is slower than our own tree"),
         (Err(missing), Ok(())) => format!(
-            "the device lacks {missing}; ray tracing pipelines alone mean that its driver traces without circuits"
+            "the device lacks {missing}; ray tracing pipelines without circuits are slower than our own tree"
         ),
         (Err(missing), Err(_)) => format!("the device lacks {missing}"),
     };

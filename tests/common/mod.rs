@@ -7,6 +7,9 @@ use etendue::scene::{Camera, Environment, Instance, Material, Mesh, Projection, 
 use etendue::settings::{BackendChoice, Settings};
 use glam::{DAffine3, DMat3, DVec3, Vec2, Vec3};
 
+#[allow(dead_code, reason = "not every test program asks for all")]
+pub mod backends;
+
 /// What came out of [`render`].
 pub struct Rendered {
     pub film: Film,
@@ -15,7 +18,7 @@ pub struct Rendered {
 
 /// Renders under validation, and asserts that no sample was dropped and that
 /// validation had nothing to say. Without a device that can do it: `None` and
-/// a printed reason, or a failure where `ETENDUE_REQUIRE_DEVICE` is 1.
+/// a printed reason, or a failure where `ETENDUE_REQUIRE_DEVICE` is set.
 pub fn render(scene: &Scene, settings: &Settings, tuning: Tuning) -> Option<Rendered> {
     let mut renderer = open(scene, settings, tuning)?;
     let film = renderer.render(&mut |_| Control::Continue).unwrap();
@@ -35,10 +38,9 @@ pub fn open(scene: &Scene, settings: &Settings, tuning: Tuning) -> Option<Render
         device: None,
         validation: true,
     };
-    let required = std::env::var_os("ETENDUE_REQUIRE_DEVICE").is_some_and(|value| value == "1");
     match Renderer::tuned(scene, settings, &options, tuning) {
         Ok(renderer) => Some(renderer),
-        Err(error @ Error::Unsupported { .. }) if !required => {
+        Err(error @ Error::Unsupported { .. }) if !backends::is_device_required() => {
             println!("skipped: {error}");
             None
         }

@@ -3,13 +3,13 @@
 use etendue::Error;
 use etendue::gpu::{Device, DeviceKind, DeviceRequest, enumerate};
 
-use crate::{device_required, missing_of};
+use crate::{Rays, is_required, missing_of};
 
 #[test]
 fn devices_are_listed_and_selected() {
     let devices = match enumerate() {
         Ok(devices) => devices,
-        Err(error @ Error::Unsupported { .. }) if !device_required() => {
+        Err(error @ Error::Unsupported { .. }) if !is_required(Rays::None) => {
             println!("skipped: {error}");
             return;
         }
@@ -31,7 +31,7 @@ fn devices_are_listed_and_selected() {
         }
     }
     let Some(able) = devices.iter().find(|caps| caps.compute.is_ok()) else {
-        assert!(!device_required(), "no device computes");
+        assert!(!is_required(Rays::None), "no device computes");
         println!("skipped: no device computes");
         return;
     };

@@ -45,7 +45,7 @@ fn open_for(rays: Rays) -> Option<Arc<Device>> {
     };
     match Device::open(&request) {
         Ok(device) => Some(device),
-        Err(error @ Error::Unsupported { .. }) if !device_required() => {
+        Err(error @ Error::Unsupported { .. }) if !is_required(rays) => {
             println!("skipped: {error}");
             None
         }
@@ -53,8 +53,9 @@ fn open_for(rays: Rays) -> Option<Arc<Device>> {
     }
 }
 
-fn device_required() -> bool {
-    std::env::var_os("ETENDUE_REQUIRE_DEVICE").is_some_and(|value| value == "1")
+/// A device is needed where the variable is set, and rays of its own where it is `1`.
+fn is_required(rays: Rays) -> bool {
+    std::env::var_os("ETENDUE_REQUIRE_DEVICE").is_some_and(|v| v == "1" || rays == Rays::None)
 }
 
 /// Destroys the device and asserts that validation had nothing to say.

@@ -5,8 +5,9 @@ use etendue::scene::Scene;
 use etendue::settings::{Settings, Strategy};
 use glam::DVec3;
 
+use crate::common::backends::pair;
 use crate::common::*;
-use crate::{BOTH, assert_mean, largest_deviation};
+use crate::{assert_mean, largest_deviation};
 
 /// The room −1 … 1 of `albedo` that emits 1 everywhere, seen from inside.
 pub fn glowing_room(albedo: f32) -> Scene {
@@ -66,7 +67,7 @@ fn closed_room_may_have_any_size_and_place() {
             scale,
             DVec3::new(offset, -offset, offset),
         );
-        for backend in BOTH {
+        for backend in pair() {
             let settings = Settings {
                 strategy: Strategy::BsdfOnly,
                 max_depth: 2,

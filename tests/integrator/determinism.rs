@@ -6,7 +6,7 @@ use etendue::scene::{LightKind, PunctualLight, Scene};
 use etendue::settings::{BackendChoice, Crop, Settings};
 use glam::{DVec3, Vec3};
 
-use crate::ALL;
+use crate::common::backends::offered;
 use crate::common::*;
 
 const SIDE: u32 = 20;
@@ -61,7 +61,7 @@ fn film(settings: &Settings, tuning: Tuning) -> Option<Film> {
 
 #[test]
 fn same_seed_gives_the_same_bits_however_the_work_is_cut() {
-    for backend in ALL {
+    for backend in offered() {
         let Some(first) = film(&plain(backend), Tuning::default()) else {
             continue;
         };
@@ -121,7 +121,7 @@ fn same_seed_gives_the_same_bits_however_the_work_is_cut() {
 
 #[test]
 fn a_renderer_that_starts_again_is_as_good_as_a_new_one() {
-    for backend in ALL {
+    for backend in offered() {
         let settings = plain(backend);
         let Some(fresh) = film(&settings, Tuning::default()) else {
             continue;
@@ -143,7 +143,7 @@ fn a_renderer_that_starts_again_is_as_good_as_a_new_one() {
 
 #[test]
 fn crop_is_a_part_of_the_frame() {
-    for backend in ALL {
+    for backend in offered() {
         let Some(whole) = film(&plain(backend), Tuning::default()) else {
             continue;
         };
@@ -175,7 +175,7 @@ fn crop_is_a_part_of_the_frame() {
 
 #[test]
 fn merged_films_are_the_film_of_all_samples() {
-    for backend in ALL {
+    for backend in offered() {
         let part = |samples| {
             let settings = Settings {
                 samples,

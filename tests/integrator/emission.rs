@@ -5,9 +5,10 @@ use etendue::scene::{Material, Scene};
 use etendue::settings::{BackendChoice, Estimator, Settings};
 use glam::{DVec3, Vec3};
 
+use crate::common::backends::{is_device_required, pair};
 use crate::common::*;
+use crate::largest_deviation;
 use crate::statistics::Estimate;
-use crate::{BOTH, largest_deviation};
 
 const RADIANCE: f32 = 3.7;
 
@@ -60,7 +61,7 @@ fn radiance_of_an_emitter_is_the_same_from_everywhere() {
 
 #[test]
 fn only_the_front_emits_unless_double_sided() {
-    for backend in BOTH {
+    for backend in pair() {
         let settings = Settings {
             backend,
             ..settings(8, 4)
@@ -160,14 +161,10 @@ fn samples_that_overflow_are_counted() {
     let settings = settings(8, 4);
     let mut renderer = match Renderer::tuned(&scene, &settings, &options, Tuning::default()) {
         Ok(renderer) => renderer,
-        Err(error) if device_required() => panic!("{error}"),
+        Err(error) if is_device_required() => panic!("{error}"),
         Err(error) => return println!("skipped: {error}"),
     };
     let film = renderer.render(&mut |_| Control::Continue).unwrap();
     assert_eq!(renderer.report().ledger.non_finite, 8 * 8 * 4);
     assert!(film.mean().iter().flatten().all(|v| *v == 0.0));
-}
-
-fn device_required() -> bool {
-    std::env::var_os("ETENDUE_REQUIRE_DEVICE").is_some_and(|value| value == "1")
 }

@@ -5,9 +5,10 @@ use etendue::scene::Scene;
 use etendue::settings::Settings;
 use glam::DVec3;
 
+use crate::common::backends::pair;
 use crate::common::*;
+use crate::largest_deviation;
 use crate::statistics::Estimate;
-use crate::{BOTH, largest_deviation};
 
 /// A white Lambert sphere under a sky of 1, seen whole and at its rim.
 fn white_sphere() -> [(&'static str, Scene); 2] {
@@ -34,7 +35,7 @@ fn lambert_sphere_vanishes_in_the_furnace() {
                 scale,
                 DVec3::new(offset, -offset, 0.5 * offset),
             );
-            for backend in BOTH {
+            for backend in pair() {
                 let settings = Settings {
                     backend,
                     aovs: true,

@@ -8,8 +8,9 @@ use etendue::scene::{Environment, Material, Medium, Mesh, Phase, Scene};
 use etendue::settings::{Settings, Strategy};
 use glam::{DVec3, Vec3};
 
+use crate::common::backends::pair;
 use crate::common::*;
-use crate::{BOTH, block, channel_mean, fresnel, glass, grey, sheet};
+use crate::{block, channel_mean, fresnel, glass, grey, sheet};
 
 /// A mesh of `material` in a white world, seen whole.
 fn in_white(mesh: Mesh, material: Material) -> Scene {
@@ -34,7 +35,7 @@ fn assert_white(what: &str, scene: &Scene, settings: &Settings, delta: f64) {
 fn lossless_solids_are_invisible_in_a_white_world() {
     let clear = Medium::default();
     let half = Vec3::splat(0.8);
-    for backend in BOTH {
+    for backend in pair() {
         let settings = Settings {
             backend,
             ..settings(32, 64)

@@ -6,13 +6,14 @@ use etendue::scene::Medium;
 use etendue::settings::Settings;
 use glam::{DVec3, Vec3};
 
+use crate::common::backends::pair;
 use crate::common::*;
-use crate::{BOTH, block, glass};
+use crate::{block, glass};
 
 #[test]
 fn camera_in_a_glass_cube_sees_n_squared_or_nothing() {
     let n = 1.5f64;
-    for backend in BOTH {
+    for backend in pair() {
         let mut dark = 0;
         let mut all = 0;
         // Six views of 90° each make up the sphere; pixels are weighted by solid angle.
@@ -91,7 +92,7 @@ fn glass_cube_may_have_any_size_and_place() {
         let from = DVec3::new(0.1, 0.2, 0.3);
         scene.cameras = vec![pinhole(from, from + DVec3::Z, 40.0)];
         let scene = carried(scene, scale, DVec3::new(offset, -offset, offset));
-        for backend in BOTH {
+        for backend in pair() {
             let settings = Settings {
                 backend,
                 ..settings(16, 16)

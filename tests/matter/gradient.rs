@@ -8,8 +8,9 @@ use etendue::scene::{Environment, Medium, Scene};
 use etendue::settings::{Settings, Strategy};
 use glam::{DVec3, Vec3};
 
+use crate::common::backends::pair;
 use crate::common::*;
-use crate::{BOTH, block, glass, oblique, sheet};
+use crate::{block, glass, oblique, sheet};
 
 const WIDTH: usize = 64;
 const HEIGHT: usize = 32;
@@ -89,7 +90,7 @@ fn single(backend: etendue::settings::BackendChoice) -> Settings {
 
 #[test]
 fn mirror_shows_the_mirrored_sky() {
-    for backend in BOTH {
+    for backend in pair() {
         for degrees in [0.0f64, 60.0, 85.0] {
             let mut scene = empty();
             add(
@@ -113,7 +114,7 @@ fn mirror_shows_the_mirrored_sky() {
 
 #[test]
 fn sheet_shows_the_sky_behind_and_the_mirrored_one() {
-    for backend in BOTH {
+    for backend in pair() {
         for degrees in [0.0f64, 60.0, 85.0] {
             let mut scene = empty();
             add(&mut scene, square(Vec3::ZERO, Vec3::Z, 5.0), sheet(1.5));
@@ -133,7 +134,7 @@ fn sheet_shows_the_sky_behind_and_the_mirrored_one() {
 #[test]
 fn face_of_a_block_shows_the_refracted_sky() {
     let n = 1.5f64;
-    for backend in BOTH {
+    for backend in pair() {
         for degrees in [0.0f64, 20.0, 40.0] {
             let mut scene = empty();
             let half = Vec3::splat(2.0);

@@ -27,13 +27,9 @@ mod slab;
 
 use common::*;
 use etendue::film::Film;
-use etendue::settings::BackendChoice;
 use glam::DVec3;
 use solids::*;
 use statistics::Estimate;
-
-/// Both traversals.
-const BOTH: [BackendChoice; 2] = [BackendChoice::Bvh, BackendChoice::RayQuery];
 
 /// Parallel rays that meet the plane z = 0 at `degrees` from +z, over a square of 2 · half metres about its origin.
 fn oblique(degrees: f64, half: f64) -> etendue::scene::Camera {

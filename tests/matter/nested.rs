@@ -5,8 +5,9 @@ use etendue::scene::{Medium, Phase, Scene};
 use etendue::settings::Settings;
 use glam::Vec3;
 
+use crate::common::backends::pair;
 use crate::common::*;
-use crate::{BOTH, block, channel_mean, fresnel, glass, grey, oblique};
+use crate::{block, channel_mean, fresnel, glass, grey, oblique};
 
 /// Transmittance of glass, liquid and glass in layers, where `touch` tells for the liquid's faces whether
 /// the index changes there; ray transfer with all reflections by adding layers.
@@ -66,7 +67,7 @@ fn assert_transmits(what: &str, scene: &Scene, settings: &Settings, truth: f64) 
 #[test]
 fn liquid_between_panes_does_not_depend_on_the_overlap() {
     let alpha = 0.3;
-    for backend in BOTH {
+    for backend in pair() {
         for degrees in [0.0, 60.0] {
             let truth = stack(&[1.5, 1.33, 1.5], &[0.0, alpha, 0.0], degrees).1;
             for overlap in [0.0, 1e-4, 1e-1] {

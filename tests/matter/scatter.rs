@@ -6,8 +6,9 @@ use etendue::scene::{LightKind, Phase, PunctualLight};
 use etendue::settings::Settings;
 use glam::{DVec3, Vec3};
 
+use crate::common::backends::pair;
 use crate::common::*;
-use crate::{BOTH, assert_channels, block, channel_mean, glass, grey, oblique};
+use crate::{assert_channels, block, channel_mean, glass, grey, oblique};
 
 /// A layer below z = 0 without an index of refraction, wide enough to be infinite.
 fn layer(thickness: f32) -> etendue::scene::Mesh {
@@ -33,7 +34,7 @@ fn thin_layer_scatters_sunlight_once() {
         (Phase::Isotropic, 1.0),
         (Phase::Rayleigh, 0.75 * (1.0 + cosine * cosine)),
     ] {
-        for backend in BOTH {
+        for backend in pair() {
             let mut scene = empty();
             // τ = 0.1 over 0.5 m, ϖ = 0.8.
             add(&mut scene, layer(0.5), glass(1.0, grey(0.04, 0.16, phase)));

@@ -6,6 +6,7 @@ use etendue::scene::{Medium, Mesh, Phase, Scene};
 use etendue::settings::{BackendChoice, Settings};
 use glam::Vec3;
 
+use crate::common::backends::pair;
 use crate::common::*;
 use crate::{assert_channels, block, channel_mean, fresnel, glass, grey, oblique, sheet};
 
@@ -86,8 +87,10 @@ fn plates_of_all_kinds() {
             }
         }
     }
-    for degrees in ANGLES {
-        assert_plate(BackendChoice::RayQuery, 1.5, 0.5, degrees, 6e-3);
+    for backend in pair() {
+        for degrees in ANGLES {
+            assert_plate(backend, 1.5, 0.5, degrees, 6e-3);
+        }
     }
 }
 

@@ -26,7 +26,7 @@ pub struct Comparison {
     /// 1 for a scene without colours, else 3.
     pub channels: usize,
     /// The renderer's traversals.
-    pub backends: &'static [BackendChoice],
+    pub backends: Vec<BackendChoice>,
 }
 
 impl Default for Comparison {
@@ -37,7 +37,7 @@ impl Default for Comparison {
             image: 1e-2,
             tile: 2e-2,
             channels: 1,
-            backends: &[BackendChoice::Bvh],
+            backends: vec![BackendChoice::Bvh],
         }
     }
 }
@@ -73,7 +73,7 @@ pub fn agree(what: &str, scene: &Scene, c: &Comparison) {
     let reference = picture(scene, &plan);
     assert_eq!(reference.given_up, 0, "{what}: paths were given up");
     let mut failures = Vec::new();
-    for &backend in c.backends {
+    for &backend in &c.backends {
         let settings = Settings {
             backend,
             ..settings(SIDE as u32, c.renderer)

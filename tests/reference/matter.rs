@@ -2,16 +2,14 @@
 
 use etendue::render::Tuning;
 use etendue::scene::{Material, Medium, Phase, Scene, Volume};
-use etendue::settings::BackendChoice;
 use glam::{DAffine3, DVec3, Vec3};
 
+use crate::common::backends::pair;
 use crate::common::*;
 use crate::compare::{Comparison, agree};
 use crate::furnace::glass;
 use crate::opaque::{block, lit_room, uneven_sky};
 use crate::scattering::matched;
-
-const BOTH: &[BackendChoice] = &[BackendChoice::Bvh, BackendChoice::RayQuery];
 
 /// Rooms: light is met by chance, so the reference needs many paths; the bounds are
 /// what these can show beside other tests in a quarter of an hour.
@@ -51,7 +49,7 @@ fn ball_of_coloured_glass() {
     ball(&mut scene, DVec3::new(0.0, -0.3, -0.2), 0.6, 2, material);
     let c = Comparison {
         channels: 3,
-        backends: BOTH,
+        backends: pair(),
         ..in_a_room()
     };
     agree("coloured glass", &scene, &c);
@@ -180,7 +178,7 @@ fn glass_water_and_air_overlap() {
         renderer: 12_288,
         image: 1e-2,
         tile: 3e-2,
-        backends: BOTH,
+        backends: pair(),
         ..in_a_room()
     };
     agree("overlap", &scene, &c);
@@ -279,7 +277,7 @@ fn fog_with_a_lamp() {
     scene.cameras = vec![pinhole(from, at, 70.0)];
     let c = Comparison {
         channels: 3,
-        backends: BOTH,
+        backends: pair(),
         ..in_a_room()
     };
     agree("fog", &scene, &c);

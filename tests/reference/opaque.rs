@@ -3,9 +3,9 @@
 use std::sync::Arc;
 
 use etendue::scene::{AlphaMode, Environment, Material, Scene};
-use etendue::settings::BackendChoice;
 use glam::{DAffine3, DVec3, Vec3};
 
+use crate::common::backends::pair;
 use crate::common::*;
 use crate::compare::{Comparison, agree};
 use crate::scattering::cuboid;
@@ -66,7 +66,7 @@ fn metal_and_plastic_in_a_room() {
         reference: 12_000,
         image: 1.5e-2,
         tile: 3e-2,
-        backends: &[BackendChoice::Bvh, BackendChoice::RayQuery],
+        backends: pair(),
         ..Comparison::default()
     };
     agree("room", &scene, &c);

@@ -8,7 +8,7 @@ use glam::{DVec3, Vec3};
 
 use crate::common::*;
 use crate::solids::{block, glass, grey};
-use crate::support::{BOTH, Random, largest_difference, mean_of, open, ray};
+use crate::support::{Random, largest_difference, mean_of, open, pair, ray};
 
 /// As many triangles without area as there are others, between them: corners that coincide or lie on a line.
 fn with_degenerates(mut mesh: Mesh) -> Mesh {
@@ -26,7 +26,7 @@ fn with_degenerates(mut mesh: Mesh) -> Mesh {
 
 #[test]
 fn triangles_without_area_change_nothing() {
-    for backend in BOTH {
+    for backend in pair() {
         let picture = |mesh: Mesh| {
             let mut scene = empty();
             add(&mut scene, mesh, lambert(0.5));
@@ -52,7 +52,7 @@ fn triangles_without_area_change_nothing() {
 /// An absorbing plate whose upper face is there twice.
 #[test]
 fn a_face_that_is_there_twice_keeps_its_parity() {
-    for backend in BOTH {
+    for backend in pair() {
         let picture = |is_doubled: bool| {
             let medium = grey(2.0, 0.0, Phase::Isotropic);
             let mut plate = block(Vec3::new(-9.0, -9.0, -0.25), Vec3::new(9.0, 9.0, 0.0));
@@ -91,7 +91,7 @@ fn a_face_that_is_there_twice_keeps_its_parity() {
 #[test]
 fn vertices_that_are_no_numbers_are_refused() {
     let mut refused = 0;
-    for backend in BOTH {
+    for backend in pair() {
         for value in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY, 1e38, -2e18] {
             for axis in 0..3 {
                 let mut mesh = square(Vec3::ZERO, Vec3::Z, 1.0);
@@ -143,7 +143,7 @@ fn rays_that_are_none_meet_nothing() {
             rays.push(ray(Vec3::Z, direction));
         }
     }
-    for backend in BOTH {
+    for backend in pair() {
         let Some(hits) = probe(backend, &rays) else {
             return;
         };
@@ -194,7 +194,7 @@ fn bounds_of_rays_are_open_and_kept() {
             wanted.push(is_met);
         }
     }
-    for backend in BOTH {
+    for backend in pair() {
         let Some(hits) = probe(backend, &rays) else {
             return;
         };
@@ -216,7 +216,7 @@ fn bounds_of_rays_are_open_and_kept() {
 /// The camera lies in the plane of a square.
 #[test]
 fn squares_seen_edge_on_are_not_there() {
-    for backend in BOTH {
+    for backend in pair() {
         let mut scene = empty();
         add(
             &mut scene,

@@ -10,7 +10,7 @@ use glam::{DAffine3, DQuat, DVec3, Vec3};
 
 use crate::common::*;
 use crate::solids::{block, glass, grey};
-use crate::support::{BOTH, Estimate, Random, largest_difference, mean_of, open, ray};
+use crate::support::{Estimate, Random, largest_difference, mean_of, open, pair, ray};
 use crate::tier::{count, is_night};
 
 /// Keeps groups of their own for meshes that are placed twice.
@@ -42,7 +42,7 @@ fn edges_between_instances_leak_little() {
             ray(from.as_vec3(), (at - from).normalize().as_vec3())
         })
         .collect();
-    for backend in BOTH {
+    for backend in pair() {
         let settings = Settings {
             backend,
             ..settings(8, 1)
@@ -61,7 +61,7 @@ fn edges_between_instances_leak_little() {
 /// A wedge of absorbing glass and its mirror image, by a mesh and by an instance.
 #[test]
 fn mirrored_glass_is_glass() {
-    for backend in BOTH {
+    for backend in pair() {
         let picture = |mirror: f64, tuning: Tuning| {
             let medium = grey(2.0, 0.0, Phase::Isotropic);
             let mut scene = empty();
@@ -118,7 +118,7 @@ fn stretched_lamps_are_what_they_look_like() {
         scene.cameras = vec![pinhole(DVec3::new(3.0, 1.0, 0.0), DVec3::ZERO, 20.0)];
         scene
     };
-    for backend in BOTH {
+    for backend in pair() {
         let settings = Settings {
             backend,
             ..settings(16, count(8192, 262_144))
@@ -296,7 +296,7 @@ fn too_many_solids_in_one_place_are_counted() {
 /// Glass of index 1 is not there, whatever is behind it.
 #[test]
 fn glass_of_index_one_is_invisible() {
-    for backend in BOTH {
+    for backend in pair() {
         let picture = |has_block: bool| {
             let mut scene = empty();
             if has_block {

@@ -8,7 +8,7 @@ use glam::{DAffine3, DMat3, DQuat, DVec3, Vec3};
 
 use crate::common::*;
 use crate::solids::{block, glass, grey};
-use crate::support::{BOTH, Random, largest_difference, mean_of};
+use crate::support::{Random, largest_difference, mean_of, pair};
 use crate::tier::count;
 
 /// The camera stands in a glass cube, within the cone of light that gets out.
@@ -75,7 +75,7 @@ fn pictures_do_not_depend_on_scale_and_place() {
         .collect();
     places.push((1.0, 1e6));
     places.push((1e-6, 1e6));
-    for backend in BOTH {
+    for backend in pair() {
         for (name, scene) in &scenes {
             let mut worst = 0.0f64;
             let mut first: Option<Film> = None;
@@ -122,7 +122,7 @@ fn random_solid(random: &mut Random, size: f64) -> Mesh {
 #[test]
 fn rays_leave_random_solids_of_all_scales() {
     const ALBEDO: f32 = 0.5;
-    for backend in BOTH {
+    for backend in pair() {
         let mut random = Random(2026);
         let (mut left, mut met) = (0u64, 0.0f64);
         let samples = count(256, 8192);
@@ -191,7 +191,7 @@ fn rays_leave_random_solids_of_all_scales() {
 /// Along a plane at 89.9° the origin of the next ray must be above it.
 #[test]
 fn planes_at_grazing_keep_their_albedo() {
-    for backend in BOTH {
+    for backend in pair() {
         for (scale, albedo) in [(1e-6, 0.5), (1e6, 0.5), (1e-6, 1.0), (1e6, 1.0)] {
             let mut scene = in_white(square(Vec3::ZERO, Vec3::Z, 1e3), lambert(albedo));
             let (sin, cos) = 89.9f64.to_radians().sin_cos();
@@ -220,7 +220,7 @@ fn planes_at_grazing_keep_their_albedo() {
 /// times, and is dark. One that a face let through without refraction would bring light.
 #[test]
 fn paths_in_glass_keep_their_side() {
-    for backend in BOTH {
+    for backend in pair() {
         let mut scene = cube();
         let from = DVec3::new(0.1, 0.2, 0.3);
         scene.cameras = vec![pinhole(from, from + DVec3::new(1.0, 1.0, -1.0), 14.0)];

@@ -5,14 +5,13 @@ use etendue::film::Film;
 use etendue::layout::{NONE, ProbeRay};
 use etendue::render::{DeviceOptions, Renderer, Tuning};
 use etendue::scene::Scene;
-use etendue::settings::{BackendChoice, Settings};
+use etendue::settings::Settings;
 use glam::{DVec3, Vec3};
 
+use crate::common::backends::is_device_required;
+pub use crate::common::backends::pair;
 pub use crate::random::Random;
 pub use crate::statistics::Estimate;
-
-/// The two intersection tests.
-pub const BOTH: [BackendChoice; 2] = [BackendChoice::Bvh, BackendChoice::RayQuery];
 
 impl Random {
     /// Uniform in [−1, 1]³.
@@ -44,9 +43,8 @@ pub fn open(scene: &Scene, settings: &Settings, tuning: Tuning) -> Option<Result
         device: None,
         validation: true,
     };
-    let required = std::env::var_os("ETENDUE_REQUIRE_DEVICE").is_some_and(|value| value == "1");
     match Renderer::tuned(scene, settings, &options, tuning) {
-        Err(error @ Error::Unsupported { .. }) if !required => {
+        Err(error @ Error::Unsupported { .. }) if !is_device_required() => {
             println!("skipped: {error}");
             None
         }

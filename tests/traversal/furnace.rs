@@ -5,8 +5,9 @@ use etendue::scene::{LightKind, Mesh, PunctualLight, Scene};
 use etendue::settings::{BackendChoice, Settings, Strategy};
 use glam::{DAffine3, DMat3, DQuat, DVec3, Vec3};
 
+use crate::backends::pair;
 use crate::scenes::{cube, icosphere, lambert, look_at, prism, scaled, scene, white_sky};
-use crate::{INTERSECTIONS, Levels, finish, open, render};
+use crate::{Levels, finish, open, render};
 
 const ALBEDO: f32 = 0.5;
 /// Roundings of the film and the BSDF, relative; one re-hit among the samples of a pixel changes it by 1/512 at least.
@@ -110,7 +111,7 @@ fn convex_solids_do_not_meet_themselves() {
         ("cube", cube()),
         ("prism", prism(300)),
     ];
-    for backend in INTERSECTIONS {
+    for backend in pair() {
         let mut spawned = 0.0;
         for (name, shape) in &shapes {
             for (size, place) in STANDS {
@@ -141,7 +142,7 @@ fn convex_solids_do_not_meet_themselves() {
 fn lit_sides_are_not_in_their_own_shadow() {
     const ILLUMINANCE: f32 = 3.0;
     let lit = ALBEDO * std::f32::consts::FRAC_1_PI * ILLUMINANCE / 3f32.sqrt();
-    for backend in INTERSECTIONS {
+    for backend in pair() {
         // Every other stand: the rays of the furnace went through all of them.
         for (size, place) in STANDS.into_iter().step_by(2) {
             let (mut scene, turn, levels) = solid(&cube(), size, place);

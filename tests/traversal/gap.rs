@@ -6,8 +6,9 @@ use etendue::scene::{LightKind, PunctualLight, Scene};
 use etendue::settings::{BackendChoice, Settings};
 use glam::{DAffine3, DVec3, Vec3};
 
+use crate::backends::pair;
 use crate::scenes::{fan, lambert, look_at, scaled, scene, white_sky};
-use crate::{INTERSECTIONS, Levels, finish, open, render};
+use crate::{Levels, finish, open, render};
 
 /// Distance of the plates relative to their half width.
 const GAP: f64 = 1e-4;
@@ -64,7 +65,7 @@ const TOLERANCE: f32 = 1e-5;
 
 #[test]
 fn plates_cast_shadows_through_thin_gaps() {
-    for backend in INTERSECTIONS {
+    for backend in pair() {
         for (size, moved) in [
             (1.0, DVec3::ZERO),
             (1e-6, DVec3::ZERO),
@@ -92,7 +93,7 @@ fn plates_cast_shadows_through_thin_gaps() {
 /// Looking flat into the gap from the lower plate's rim: the lower plate under the upper one is in its shadow.
 #[test]
 fn inside_of_the_gap_is_dark() {
-    for backend in INTERSECTIONS {
+    for backend in pair() {
         let mut scene = plates(1.0, DVec3::ZERO, false);
         scene.cameras.clear();
         // All rays go between the plates: from the middle of the gap, down at the lower plate.

@@ -3,13 +3,15 @@
 //! both depths of the hierarchy agree. Everything runs under validation.
 //!
 //! Without a device the tests print why they are skipped; with the environment
-//! variable `ETENDUE_REQUIRE_DEVICE=1` they fail instead.
+//! variable `ETENDUE_REQUIRE_DEVICE` they fail instead.
 #![allow(
     clippy::unwrap_used,
     clippy::print_stdout,
     reason = "tests may unwrap, and they say why they skip and what they measured"
 )]
 
+#[path = "../common/backends.rs"]
+mod backends;
 #[path = "../common/random.rs"]
 mod random;
 #[path = "../common/statistics.rs"]
@@ -30,15 +32,6 @@ use etendue::film::Film;
 use etendue::render::{Control, DeviceOptions, Renderer, Tuning};
 use etendue::scene::Scene;
 use etendue::settings::{BackendChoice, Settings};
-
-const BACKENDS: [BackendChoice; 3] = [
-    BackendChoice::Bvh,
-    BackendChoice::RayQuery,
-    BackendChoice::RayPipeline,
-];
-/// Each with an intersection test of its own: where rays are many, and the ray tracing
-/// pipeline would meet the triangles of ray query once more.
-const INTERSECTIONS: [BackendChoice; 2] = [BackendChoice::Bvh, BackendChoice::RayQuery];
 
 /// How shared meshes are traced.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -68,16 +61,12 @@ fn open(scene: &Scene, settings: &Settings, levels: Levels) -> Option<Renderer> 
             assert_eq!(renderer.report().backend, settings.backend);
             Some(renderer)
         }
-        Err(error @ Error::Unsupported { .. }) if !device_required() => {
+        Err(error @ Error::Unsupported { .. }) if !backends::is_device_required() => {
             println!("skipped: {error}");
             None
         }
         Err(error) => panic!("{error}"),
     }
-}
-
-fn device_required() -> bool {
-    std::env::var_os("ETENDUE_REQUIRE_DEVICE").is_some_and(|value| value == "1")
 }
 
 /// A renderer for probes.

@@ -4,10 +4,11 @@ use etendue::layout::{NONE, ProbeRay};
 use etendue::scene::Scene;
 use glam::{DVec3, Vec3};
 
+use crate::backends::offered;
 use crate::brute::{Brute, check, nearest};
 use crate::scenes::{Random, mesh, single};
 use crate::table::placed;
-use crate::{BACKENDS, Levels, finish, prober};
+use crate::{Levels, finish, prober};
 
 /// Rays of the largest test; the others have a share of it.
 const RAYS: usize = 100_000;
@@ -64,7 +65,7 @@ fn compare(name: &str, scene: &Scene, levels: Levels, size: f64, count: usize) {
         hits > count / 4 && hits < count,
         "{hits} of {count} rays hit"
     );
-    for backend in BACKENDS {
+    for backend in offered() {
         let Some(renderer) = prober(scene, backend, levels) else {
             return;
         };

@@ -5,9 +5,10 @@ use etendue::layout::{NONE, ProbeHit, ProbeRay};
 use etendue::scene::{AlphaMode, Scene};
 use glam::{DAffine3, DMat3, DQuat, DVec3, Vec3};
 
+use crate::backends::offered;
 use crate::brute::{Brute, T_TOLERANCE, check};
 use crate::scenes::{checker, cut_out, fan, lambert, mesh, scaled, scene, single};
-use crate::{BACKENDS, Levels, finish, prober};
+use crate::{Levels, finish, prober};
 
 /// What a ray of the table must meet.
 enum Expect {
@@ -71,7 +72,7 @@ fn assert_answer(label: &str, case: &Case, hit: &ProbeHit) {
 fn run(name: &str, scene: &Scene, levels: Levels, cases: &[Case]) {
     let brute = Brute::new(scene, levels);
     let rays: Vec<_> = cases.iter().map(|c| c.ray).collect();
-    for backend in BACKENDS {
+    for backend in offered() {
         let Some(renderer) = prober(scene, backend, levels) else {
             return;
         };

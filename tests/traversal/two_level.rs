@@ -5,9 +5,10 @@ use etendue::layout::{NONE, ProbeHit};
 use etendue::scene::{Material, Scene};
 use glam::{DAffine3, DMat3, DQuat, DVec3, Vec3};
 
+use crate::Levels;
+use crate::backends::offered;
 use crate::pictures::{SIZE, Side, assert_same_picture, look, other_ids, primary_rays};
 use crate::scenes::{cube, fan, icosphere, lambert, look_at, scaled, scene};
-use crate::{BACKENDS, Levels};
 
 /// A floor, placed spheres and placed lamps; turned, stretched and mirrored. Lamps shine from the front only, so
 /// that a mirrored one that forgot to turn its winding would be dark.
@@ -93,7 +94,7 @@ fn from_two(scene: &Scene, hit: &ProbeHit) -> (u32, u32) {
 fn two_levels_equal_copies() {
     let scene = lamps();
     let rays = primary_rays(&scene, (160, 128));
-    for backend in BACKENDS {
+    for backend in offered() {
         let mut hits = Vec::new();
         let mut films = Vec::new();
         for levels in [Levels::Flat, Levels::Two] {

@@ -6,9 +6,10 @@ use etendue::scene::{Mesh, Scene};
 use etendue::settings::BackendChoice;
 use glam::{DAffine3, DVec3, Vec3};
 
+use crate::backends::pair;
 use crate::brute::origin;
 use crate::scenes::{Random, cube, fan, icosphere, lambert, scaled, scene, single};
-use crate::{INTERSECTIONS, Levels, finish, prober};
+use crate::{Levels, finish, prober};
 
 /// Rays into each mesh and place; there are twelve for each backend.
 const RAYS: usize = 90_000;
@@ -134,7 +135,7 @@ fn closed_meshes_have_no_gaps() {
         .iter()
         .map(|s| rays_at_edges(&s.scene.meshes[0], &s.place, s.size, &mut random))
         .collect();
-    for backend in INTERSECTIONS {
+    for backend in pair() {
         let mut lost = 0;
         for (stand, rays) in stands.iter().zip(&rays) {
             let Some(count) = leaks(&stand.scene, rays, backend, stand.levels) else {
@@ -184,7 +185,7 @@ fn closed_cube_along_the_axes() {
         }
     }
     let scene = single(cube());
-    for backend in INTERSECTIONS {
+    for backend in pair() {
         let Some(renderer) = prober(&scene, backend, Levels::Flat) else {
             return;
         };
