@@ -121,7 +121,8 @@ pub struct MeasureArgs {
     /// Seconds of measuring at most; at least one pass is measured
     #[arg(long, value_name = "SECONDS", allow_negative_numbers = true, value_parser = positive)]
     pub time: Option<f64>,
-    /// Stop when the standard error is at most X of the luminance-weighted value
+    /// As many samples as give a standard error of X of the luminance-weighted value;
+    /// other samples, a ninth as many, tell how many that are
     #[arg(long, value_name = "X", allow_negative_numbers = true, value_parser = positive)]
     pub noise: Option<f64>,
     /// Seed of the random numbers
@@ -169,8 +170,8 @@ pub struct RenderArgs {
     /// Seconds of rendering at most; at least one pass is rendered
     #[arg(long, value_name = "SECONDS", allow_negative_numbers = true, value_parser = positive)]
     pub time: Option<f64>,
-    /// Stop when the standard error is at most X of the signal, both as root mean
-    /// squares over the image; tested from 16 samples on
+    /// As many samples as give a standard error of X of the signal, both as root mean
+    /// squares over the image; other samples, a ninth as many, tell how many that are
     #[arg(long, value_name = "X", allow_negative_numbers = true, value_parser = positive)]
     pub noise: Option<f64>,
     /// Seed of the random numbers

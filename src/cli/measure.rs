@@ -1,6 +1,9 @@
 //! `etendue measure`: a light meter in a scene.
 
-use etendue::render::{Control, DeviceOptions, Reading, Renderer};
+use std::time::Instant;
+
+use etendue::film::Film;
+use etendue::render::{Control, DeviceOptions, Progress, Reading, Renderer, Work};
 use etendue::scene::Scene;
 use etendue::settings::{Sensor, Settings};
 use etendue::{Error, Result};
@@ -11,6 +14,7 @@ use super::args::MeasureArgs;
 use super::failure::{Failure, Outcome};
 use super::interrupt::Interrupt;
 use super::numbers::numbers;
+use super::pilot;
 use super::render::load_scene;
 use super::{write_stderr, write_stdout};
 
@@ -60,19 +64,34 @@ pub fn run(args: &MeasureArgs) -> Result<Outcome, Failure> {
     };
     let mut renderer = Renderer::new(&scene, &settings, &device)?;
     interrupt.begin_rendering();
+    let begun = Instant::now();
+    let is_late = || {
+        let time = args.time.unwrap_or(f64::INFINITY);
+        begun.elapsed().as_secs_f64() >= time
+    };
+    if let Some(limit) = args.noise {
+        let mut film = Film::of(&settings);
+        renderer.restart(settings.samples.clone(), pilot::seed(args.seed))?;
+        let needed = pilot::plan(limit, settings.samples.end, |samples| {
+            let so_far = std::mem::replace(&mut film, Film::of(&settings));
+            let mut control = |_: &Progress| match interrupt.is_requested() || is_late() {
+                true => Control::Stop,
+                false => Control::Continue,
+            };
+            film = renderer.resume(so_far, Work::default(), &[0..samples], &mut control)?;
+            if film.samples() < samples {
+                return Ok(None);
+            }
+            let (value, error) = Reading::of(&film, &quantity.sensor, &scene)?.luminance();
+            Ok(Some(if error == 0.0 { 0.0 } else { error / value }))
+        })?;
+        let end = needed.unwrap_or(settings.samples.end);
+        renderer.restart(0..end, args.seed)?;
+    }
     let mut is_interrupted = false;
     let film = renderer.render(&mut |progress| {
         is_interrupted = interrupt.is_requested();
-        let late = args
-            .time
-            .is_some_and(|t| progress.elapsed.as_secs_f64() >= t);
-        let good = args.noise.is_some_and(|x| {
-            let reading = Reading::of(progress.film, &quantity.sensor, &scene);
-            progress.pass_complete
-                && progress.samples_done >= 16
-                && reading.is_ok_and(|r| r.luminance().1 <= x * r.luminance().0)
-        });
-        match is_interrupted || (progress.samples_done > 0 && (late || good)) {
+        match is_interrupted || (progress.samples_done > 0 && is_late()) {
             true => Control::Stop,
             false => Control::Continue,
         }

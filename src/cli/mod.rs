@@ -14,6 +14,7 @@ mod interrupt;
 mod measure;
 mod merge;
 mod numbers;
+mod pilot;
 mod plan;
 mod progress;
 mod render;

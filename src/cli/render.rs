@@ -1,5 +1,6 @@
 //! `etendue render`: arguments → settings → library → files.
 
+use std::ops::Range;
 use std::path::Path;
 use std::time::Instant;
 
@@ -9,6 +10,7 @@ use etendue::image_io::{
 };
 use etendue::render::{Control, Progress, Report, Team, Work};
 use etendue::scene::{Environment, Scene, gltf, load_environment};
+use etendue::settings::Settings;
 use etendue::{Error, Result};
 
 use super::args::RenderArgs;
@@ -16,14 +18,11 @@ use super::checkpoint::{self, Cost, Keeper, Saved};
 use super::failure::{Failure, Outcome};
 use super::header::{self, Job, Record, Stop};
 use super::interrupt::Interrupt;
-use super::plan;
 use super::progress::Reporter;
 use super::rerender::Repeat;
 use super::settings::{DEFAULT_SPP, settings};
+use super::{pilot, plan};
 use super::{stats, write_stderr};
-
-/// With fewer samples the standard error itself is too uncertain to decide by.
-const MIN_SAMPLES_FOR_NOISE: u64 = 16;
 
 /// Renders and writes what was asked for.
 pub fn run(args: &RenderArgs) -> Result<Outcome, Failure> {
@@ -56,7 +55,17 @@ pub fn repeat(args: &RenderArgs, repeats: Option<&Repeat>) -> Result<Outcome, Fa
     let (film, work) = begin(&job, saved, &renderer.report(), &reporter)?;
 
     interrupt.begin_rendering();
-    let rendered = render(&mut renderer, &job, film, work, &interrupt, &mut reporter);
+    let rendered = plan_samples(&mut renderer, &job, &interrupt, &reporter).and_then(|samples| {
+        let begun = (film, work);
+        render(
+            &mut renderer,
+            &job,
+            begun,
+            &samples,
+            &interrupt,
+            &mut reporter,
+        )
+    });
     let (film, stop, cost) =
         rendered.map_err(|error| rescue(error, &mut renderer, &job, &reporter))?;
     interrupt.begin_writing();
@@ -243,19 +252,67 @@ fn introduce(reporter: &Reporter, job: &Job, renderer: &Team) {
     ));
 }
 
+/// The samples of the job; with `--noise`, as many of them as a pilot says.
+fn plan_samples(
+    renderer: &mut Team,
+    job: &Job,
+    interrupt: &Interrupt,
+    reporter: &Reporter,
+) -> Result<Vec<Range<u64>>> {
+    let all = job.samples();
+    let (Some(limit), None) = (job.args.noise, job.repeats) else {
+        return Ok(all);
+    };
+    let Range { start, end } = job.settings.samples;
+    let pilot = Settings {
+        seed: pilot::seed(job.settings.seed),
+        ..job.settings.clone()
+    };
+    renderer.restart(pilot.samples.clone(), pilot.seed)?;
+    let begun = Instant::now();
+    let is_late = || {
+        let time = job.args.time.unwrap_or(f64::INFINITY);
+        interrupt.is_requested() || begun.elapsed().as_secs_f64() >= time
+    };
+    let mut film = Film::of(&pilot);
+    let needed = pilot::plan(limit, end - start, |samples| {
+        let so_far = std::mem::replace(&mut film, Film::of(&pilot));
+        let range = start..start + samples;
+        film = renderer.resume(
+            so_far,
+            Work::default(),
+            &[range],
+            &mut |_| match is_late() {
+                true => Control::Stop,
+                false => Control::Continue,
+            },
+        )?;
+        Ok((film.samples() == samples).then(|| film.relative_error()))
+    })?;
+    renderer.restart(job.settings.samples.clone(), job.settings.seed)?;
+    let Some(needed) = needed else {
+        return Ok(all);
+    };
+    let error = film.relative_error();
+    reporter.note(&format!(
+        "{} other samples have a relative error of {error:.2e}: {needed} are needed",
+        film.samples()
+    ));
+    Ok(Vec::from([start..start + needed]))
+}
+
 /// Renders until the first limit is reached.
 fn render(
     renderer: &mut Team,
     job: &Job,
-    film: Film,
-    before: Work,
+    (film, before): (Film, Work),
+    samples: &[Range<u64>],
     interrupt: &Interrupt,
     reporter: &mut Reporter,
 ) -> Result<(Film, Stop, Cost)> {
-    let samples = job.samples();
     let mut stop = Stop::Samples;
     let mut keeper = Keeper::new(job, &renderer.report());
-    let film = renderer.resume(film, before, &samples, &mut |progress| {
+    let film = renderer.resume(film, before, samples, &mut |progress| {
         reporter.update(progress);
         stop = if interrupt.is_requested() {
             Stop::Interrupt
@@ -271,9 +328,12 @@ fn render(
         }
         Control::Continue
     })?;
-    // the limit came with the last sample: nothing was cut short
-    if film.missing(&samples).is_empty() {
-        stop = Stop::Samples;
+    if film.missing(samples).is_empty() {
+        stop = match job.args.noise {
+            Some(limit) if !film.missing(&job.samples()).is_empty() => Stop::Noise(limit),
+            // the limit came with the last sample: nothing was cut short
+            _ => Stop::Samples,
+        };
     }
     let cost = keeper.map_or_else(Cost::default, |keeper| keeper.cost);
     Ok((film, stop, cost))
@@ -318,16 +378,7 @@ fn limit(args: &RenderArgs, progress: &Progress) -> Stop {
             return Stop::Time(limit);
         }
     }
-    match args.noise {
-        Some(limit)
-            if progress.pass_complete
-                && samples >= MIN_SAMPLES_FOR_NOISE
-                && progress.film.relative_error() <= limit =>
-        {
-            Stop::Noise(limit)
-        }
-        _ => Stop::Samples,
-    }
+    Stop::Samples
 }
 
 /// Says what is not as the user may believe.
@@ -346,6 +397,14 @@ fn warn_about(record: &Record, reporter: &Reporter) {
         ));
     }
     let args = record.job.args;
+    if let Stop::Noise(limit) = record.stop {
+        let error = record.film.relative_error();
+        if error > limit {
+            reporter.warn(&format!(
+                "the relative error is {error:.2e}, above --noise {limit}: rare bright samples came; --spp takes more"
+            ));
+        }
+    }
     let by_default = args.spp.is_none() && args.samples.is_none();
     if record.stop == Stop::Samples && by_default && (args.time.is_some() || args.noise.is_some()) {
         reporter.warn(&format!(

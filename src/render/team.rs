@@ -93,6 +93,19 @@ impl Team {
         })
     }
 
+    /// As [`Renderer::restart`].
+    ///
+    /// # Errors
+    /// As [`Renderer::restart`], of any device.
+    pub fn restart(&mut self, samples: Range<u64>, seed: u64) -> Result<()> {
+        for member in &mut self.members {
+            member.restart(samples.clone(), seed)?;
+        }
+        self.settings.samples = samples;
+        self.settings.seed = seed;
+        Ok(())
+    }
+
     /// As [`Renderer::resume`]. A device that fails is left out from then on; the render
     /// fails with the last.
     ///

@@ -27,6 +27,7 @@ mod determinism;
 mod emission;
 mod features;
 mod furnace;
+mod intervals;
 mod lamps;
 mod normals;
 mod punctual;
