@@ -22,6 +22,7 @@ struct FilmNode {
     vec3 normal;
     float depth;
     float coverage;
+    float dropped;   // samples
 };
 
 // Two siblings of `count` samples each, the earlier one first.
@@ -46,6 +47,7 @@ FilmNode film_merge(FilmNode a, FilmNode b, float count)
         r.normal = normal;
         r.depth = depth;
         r.coverage = a.coverage + b.coverage;
+        r.dropped = a.dropped + b.dropped;
     }
     return r;
 }
@@ -64,6 +66,7 @@ void film_write(uint pixel, FilmNode node)
     if (HAS_AOVS) {
         film[at + 12u] = node.depth;
         film[at + 13u] = node.coverage;
+        film[at + 14u] = node.dropped;
     }
 }
 

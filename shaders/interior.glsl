@@ -14,6 +14,13 @@
 // Solids that may hold one point; more are counted in the ledger.
 const uint INTERIOR_SIZE = 8u;
 
+// Where faces are looked for that coincide with one, and what is too close together to have an order, in bounds on the
+// error of the place (interior_boundary). By a model in single precision of rays past corners of eight blocks: with these none of
+// 11 400 is lost, with 4 instead of 6 up to 12 of 3000, with an order of everything up to 214 of 3000.
+const float SEARCH_BEFORE = 2.0;
+const float SEARCH_BEYOND = 6.0;
+const float SEARCH_TIE = 0.1;
+
 struct Interior {
     uint current;                 // material that fills the space
     // Only with HAS_NESTED:
@@ -114,27 +121,79 @@ Boundary interior_boundary(Interior here, Hit hit, SurfacePoint s, vec3 d, inout
         return b;
     }
     b.before = here.current;
-    b.beyond = interior_cross(here, uvec2(s.material, hit.instance), s.is_front);
-    // The plane is met once more from just before it, to see what else lies there: twice the way
-    // to it; where the ray only grazes it, faces count as apart.
-    vec3 origin = offset_origin(s.position, s.error, s.ng);
-    float t_max = 2.0 * distance(origin, s.position) / max(-dot(s.ng, d), 0.01);
-    for (uint k = 0u; k < INTERIOR_SIZE; k++) {
-        surface_skip = uvec2(hit.instance, hit.primitive);
-        rays++;
-        if (!trace_closest(origin, d, 0.0, t_max, NONE, hit)) {
+    surface_skip.is_search = true;
+    surface_skip.direction = d;
+    surface_skip.count = here.count;
+    for (uint k = 0u; k < here.count; k++) {
+        surface_skip.solids[k] = uvec2(here.entered[k].x | SKIP_HELD | SKIP_HOLDS, here.entered[k].y);
+    }
+    // What lies there is met once more, backwards from a little beyond: of the faces of each solid the last one says whether
+    // the ray is in it afterwards. So it does not matter where a search ends, nor that the next one meets some of them again.
+    // Where the order of a front and a back is not known, a corner or an edge was touched, and the solid stays what it was.
+    float cosine = max(-dot(s.ng, d), 0.01);
+    float bound = max_component(s.error);
+    float step = bound / cosine;
+    vec3 origin = s.position + SEARCH_BEYOND * (cosine > MIN_STRAIGHT_COSINE ? step * d : -bound * s.ng);
+    float at[SKIP_SIZE];
+    uvec2 solid = uvec2(s.material, hit.instance);
+    bool is_front = s.is_front;
+    bool is_first = true;
+    float t_min = 0.0;
+    bool fits = true;
+    for (uint k = 0u; k < 2u * SKIP_SIZE; k++) {
+        if (!is_first) {
+            rays++;
+            if (!trace_closest(origin, -d, t_min, (SEARCH_BEFORE + SEARCH_BEYOND) * step, NONE, hit)) {
+                break;
+            }
+            SurfaceSide other = surface_side(hit.instance, hit.primitive, d);
+            if (!other.is_solid) {
+                t_min = hit.t;
+                continue;
+            }
+            solid = uvec2(other.material, hit.instance);
+            is_front = other.is_front;
+        }
+        uint slot = surface_skip_slot(solid);
+        fits = slot < SKIP_SIZE;
+        if (!fits) {
             break;
         }
-        SurfaceSide other = surface_side(hit, d);
-        uint count = b.beyond.count;
-        if (other.is_solid) {
-            b.beyond = interior_cross(b.beyond, uvec2(other.material, hit.instance), other.is_front);
+        if (slot == surface_skip.count) {
+            surface_skip.solids[slot] = solid;
+            surface_skip.count++;
         }
-        if (b.beyond.count == count) {
-            break; // nothing new: the first face was met again
+        uint flags = surface_skip.solids[slot].x & SKIP_FLAGS;
+        bool was_held = (flags & SKIP_HELD) != 0u;
+        bool holds = is_front;
+        float t = is_first ? SEARCH_BEYOND * step : hit.t;
+        if ((flags & SKIP_FOUND) != 0u) {
+            float later = at[slot] - t;
+            holds = abs(later) <= SEARCH_TIE * step ? was_held : (later > 0.0) == is_front;
+            flags |= SKIP_SETTLED;
+        } else {
+            flags |= SKIP_FOUND | (!is_first && is_front == was_held ? SKIP_SETTLED : 0u);
+            at[slot] = t;
+        }
+        surface_skip.solids[slot].x = solid.x | (flags & ~SKIP_HOLDS) | (holds ? SKIP_HOLDS : 0u);
+        is_first = false;
+    }
+    b.beyond.count = 0u;
+    for (uint k = 0u; k < surface_skip.count; k++) {
+        uvec2 held = surface_skip.solids[k];
+        if ((held.x & SKIP_HOLDS) == 0u) {
+            continue;
+        }
+        if (b.beyond.count < INTERIOR_SIZE) {
+            b.beyond.entered[b.beyond.count] = uvec2(held.x & ~SKIP_FLAGS, held.y);
+            b.beyond.count++;
+        } else {
+            fits = false;
         }
     }
-    surface_skip = uvec2(NONE);
+    interior_overflows += fits ? 0u : 1u;
+    surface_skip_triangle(uvec2(NONE));
+    b.beyond.current = interior_highest(b.beyond);
     b.after = b.beyond.current;
     return b;
 }

@@ -77,7 +77,7 @@ void main()
         non_finite += is_dropped ? 1u : 0u;
 
         FilmNode node = FilmNode(is_dropped ? vec3(0.0) : result.radiance, vec3(0.0), result.first.albedo, result.first.normal,
-                                 result.first.depth, result.first.coverage);
+                                 result.first.depth, result.first.coverage, is_dropped ? 1.0 : 0.0);
         // A binary counter: each set bit of i is a finished sibling. The bounds
         // are constant so that the levels stay in registers.
         for (uint level = 0u; level < FILM_LEVELS; level++) {

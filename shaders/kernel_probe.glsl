@@ -15,6 +15,9 @@ void main()
         return;
     }
     ProbeRay ray = probe_rays[i];
+    if (HAS_NESTED) {
+        surface_skip_triangle(uvec2(NONE));
+    }
     Hit hit;
     bool is_hit = trace_closest(ray.origin, ray.direction, ray.t_min, ray.t_max, ray.from, hit);
     bool is_occluded = trace_occluded(ray.origin, ray.direction, ray.t_min, ray.t_max, ray.from);

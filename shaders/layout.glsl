@@ -245,9 +245,10 @@ struct ProbeHit {
 // --- Film ------------------------------------------------------------------------
 
 // Per pixel of the window, FILM_FLOATS (with HAS_AOVS FILM_FLOATS_AOV) floats: sum of radiance and sum of squared
-// deviations from the mean over the batch's samples, then sums of albedo, normal, depth and coverage of the first hit.
+// deviations from the mean over the batch's samples, then sums of albedo, normal, depth and coverage of the first hit, and
+// the number of samples that were dropped.
 const uint FILM_FLOATS = 6u;
-const uint FILM_FLOATS_AOV = 14u;
+const uint FILM_FLOATS_AOV = 15u;
 // Counters of the ledger.
 const uint LEDGER_NON_FINITE = 0u;
 const uint LEDGER_TRUNCATED = 1u;

@@ -238,7 +238,7 @@ void path_shadow(inout PathState path, inout PathResult result, bool is_hit, Sur
     bool is_done = !is_hit;
     if (is_hit) {
         path.shadow.value *= through;
-        vec3 origin = offset_origin(s.position, s.error, -s.ng);
+        vec3 origin = s.position + surface_step(s, path.shadow.ray.direction);
         shadow_aim(path.shadow, origin);
         path.shadow.from = s.record;
         path.shadow.lead = dot(origin - s.position, path.shadow.ray.direction);
@@ -274,7 +274,7 @@ void path_surface(inout PathState path, inout PathResult result, SurfacePoint s,
         is_passed = is_solid && boundary.before == boundary.after;
     }
     if (is_passed) {
-        path_leave(path, s, far_side, path.ray.direction);
+        path_leave(path, s, s.position + surface_step(s, path.ray.direction), path.ray.direction);
         path.interior = boundary.beyond;
         return;
     }
@@ -320,7 +320,7 @@ void path_surface(inout PathState path, inout PathResult result, SurfacePoint s,
             path.scale = square(path.camera_ior / interior_ior(boundary.after));
         }
         if (next.is_straight) {
-            path_leave(path, s, origin, path.ray.direction);
+            path_leave(path, s, s.position + surface_step(s, path.ray.direction), path.ray.direction);
             path.is_alive = max_component(path.beta) > 0.0;
             return;
         }
@@ -370,8 +370,8 @@ void path_step(inout PathState path, inout PathResult result)
     } else if (!path.is_search) {
         path.event++;
     }
-    if (HAS_INSIDE && HAS_NESTED) {
-        surface_skip = path.is_search ? path.search.last : uvec2(NONE);
+    if (HAS_NESTED) {
+        surface_skip_triangle(HAS_INSIDE && path.is_search ? path.search.last : uvec2(NONE));
     }
     Hit hit;
     bool is_sensor = path.is_sensor && !is_shadow && !path.is_search;

@@ -18,6 +18,8 @@ const float POSITION_ROUNDINGS = 8.0;
 // Smallest cosine of wo to the shading normal, and of its mirror image to the
 // geometric one; see surface_bend.
 const float MIN_SHADING_COSINE = 1.0e-3;
+// Rays that go straight on through a surface start on their own line if its cosine to the normal is larger; see surface_step.
+const float MIN_STRAIGHT_COSINE = 0.1;
 
 struct SurfacePoint {
     vec3 position;
@@ -159,9 +161,36 @@ vec4 surface_base_color(Material material, uvec4 triangle, vec2 bary)
         * surface_texture(material, TEXTURE_BASE_COLOR, triangle, bary) * surface_vertex_color(triangle, bary);
 }
 
+// What a solid's boundary is, without its shading.
+struct SurfaceSide {
+    uint material;
+    bool is_solid;
+    bool is_front; // a ray along d comes from the side that the winding calls front
+};
+
+SurfaceSide surface_side(uint instance, uint primitive, vec3 d)
+{
+    uvec4 triangle = surface_triangle(instance, primitive);
+    TriangleShape shape = surface_shape(instance, triangle);
+    SurfaceSide side;
+    side.material = triangle.w & TRIANGLE_MATERIAL_MASK;
+    side.is_solid = (scene_material(side.material).flags & MATERIAL_SOLID) != 0u;
+    side.is_front = (dot(cross(shape.e1, shape.e2), d) <= 0.0) != shape.is_mirrored;
+    return side;
+}
+
+bool surface_is_skipped(uint instance, uint primitive)
+{
+    if (!surface_skip.is_search) {
+        return uvec2(instance, primitive) == surface_skip.triangle;
+    }
+    SurfaceSide side = surface_side(instance, primitive, surface_skip.direction);
+    return side.is_solid && !surface_skip_asks(uvec2(side.material, instance), side.is_front);
+}
+
 bool surface_is_opaque(uint instance, uint primitive, vec2 bary)
 {
-    if (HAS_NESTED && uvec2(instance, primitive) == surface_skip) {
+    if (HAS_NESTED && surface_is_skipped(instance, primitive)) {
         return false;
     }
     if (!HAS_ALPHA) {
@@ -251,24 +280,6 @@ vec3 surface_mapped_normal(Material material, uint instance, uvec4 triangle, Tri
     return mapped2 > 0.0 ? mapped * inversesqrt(mapped2) : n;
 }
 
-// What a solid's boundary is, without its shading.
-struct SurfaceSide {
-    uint material;
-    bool is_solid;
-    bool is_front; // a ray along d comes from the side that the winding calls front
-};
-
-SurfaceSide surface_side(Hit hit, vec3 d)
-{
-    uvec4 triangle = surface_triangle(hit.instance, hit.primitive);
-    TriangleShape shape = surface_shape(hit.instance, triangle);
-    SurfaceSide side;
-    side.material = triangle.w & TRIANGLE_MATERIAL_MASK;
-    side.is_solid = (scene_material(side.material).flags & MATERIAL_SOLID) != 0u;
-    side.is_front = (dot(cross(shape.e1, shape.e2), d) <= 0.0) != shape.is_mirrored;
-    return side;
-}
-
 // A white Lambert surface, without its place.
 SurfacePoint surface_white()
 {
@@ -291,6 +302,15 @@ SurfacePoint surface_white()
     s.ior = 1.0;
     s.strength = vec3(1.0);
     return s;
+}
+
+// From s to where a ray along d that goes straight on starts: as far off the surface as offset_origin() goes, and on the
+// ray's line, so that thousands of such steps do not carry it aside. At grazing incidence the line is near the surface for long, and it starts beside it.
+vec3 surface_step(SurfacePoint s, vec3 d)
+{
+    float height = dot(abs(s.ng), s.error);
+    float cosine = -dot(s.ng, d);
+    return cosine > MIN_STRAIGHT_COSINE ? (height / cosine) * d : -height * s.ng;
 }
 
 // Everything about the point that a ray from direction −wo met.

@@ -9,5 +9,8 @@ hitAttributeEXT vec2 bary;
 
 void main()
 {
-    payload = TracePayload(gl_HitTEXT, bary, uint(gl_InstanceCustomIndexEXT), uint(gl_PrimitiveID));
+    payload.t = gl_HitTEXT;
+    payload.bary = bary;
+    payload.instance = uint(gl_InstanceCustomIndexEXT);
+    payload.primitive = uint(gl_PrimitiveID);
 }

@@ -3,11 +3,14 @@
 #ifndef TRACE_PAYLOAD_GLSL
 #define TRACE_PAYLOAD_GLSL
 
+#include "surface_skip.glsl"
+
 struct TracePayload {
     float t;        // metres; < 0 where the ray met nothing
     vec2 bary;      // weights of the second and third vertex
-    uint instance;  // on the way there, this and the next are the triangle to pass over (surface_skip)
+    uint instance;
     uint primitive;
+    SurfaceSkip skip; // on the way there, with HAS_NESTED
 };
 
 #endif

@@ -21,8 +21,7 @@ struct Hit {
 // Deterministic alpha test; defined in surface.glsl.
 bool surface_is_opaque(uint instance, uint primitive, vec2 bary);
 
-// With HAS_NESTED: (instance, primitive) that rays pass as if it were not there.
-uvec2 surface_skip = uvec2(NONE);
+#include "surface_skip.glsl"
 
 #ifdef TRAVERSE_QUERY
 #include "traverse_query.glsl"

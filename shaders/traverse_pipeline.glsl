@@ -3,7 +3,7 @@
 // not count.
 //
 // Requires, declared before: layout.glsl (BIND_SCENE, NONE), spec.glsl (HAS_CANDIDATES), struct Hit,
-//   uvec2 surface_skip, which candidates (trace.rahit) are told;
+//   SurfaceSkip surface_skip, which candidates (trace.rahit) are told;
 // and, since it must stand before all declarations, in the entry:
 //   #extension GL_EXT_ray_tracing : require
 // `record` is NONE, and `from` not used.
@@ -25,7 +25,8 @@ bool trace_send(uint flags, vec3 origin, vec3 dir, float t_min, float t_max) {
     if (!(t_min >= 0.0 && t_min <= t_max)) return false;
     flags |= HAS_CANDIDATES ? gl_RayFlagsNoneEXT : gl_RayFlagsOpaqueEXT;
     // Without a closest-hit shader nobody changes the distance of what was met.
-    trace_payload = TracePayload(0.0, vec2(0.0), surface_skip.x, surface_skip.y);
+    trace_payload.t = 0.0;
+    if (HAS_NESTED) trace_payload.skip = surface_skip;
     traceRayEXT(scene, flags, TRACE_ALL, 0u, 0u, 0u, origin, t_min, dir, t_max, 0);
     return trace_payload.t >= 0.0;
 }

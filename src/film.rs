@@ -29,6 +29,7 @@ const ALBEDO: usize = 6;
 const NORMAL: usize = 9;
 const DEPTH: usize = 12;
 const COVERAGE: usize = 13;
+const DROPPED: usize = 14;
 
 /// A complete node of the tree over sample indices.
 struct Node {
@@ -122,7 +123,7 @@ impl Film {
         self.full
     }
 
-    /// Whether albedo, normal, depth and coverage are averaged too.
+    /// Whether albedo, normal, depth and coverage are averaged and dropped samples counted too.
     pub fn has_aovs(&self) -> bool {
         self.aovs
     }
@@ -199,7 +200,7 @@ impl Film {
     /// of the window row by row, the sum of radiance (3), the sum of squared
     /// deviations from the node's own mean (3; of samples up to a single block, of
     /// blocks beyond, each counted once for each of its samples) and, with AOVs,
-    /// the sums of albedo (3), normal (3), depth (1) and coverage (1).
+    /// the sums of albedo (3), normal (3), depth (1) and coverage (1) and the number of dropped samples (1).
     ///
     /// # Errors
     /// [`Error::Settings`] when the node is not aligned, has the wrong size, or
@@ -313,6 +314,16 @@ impl Film {
             self.map_pixels(|pixel| {
                 let [coverage] = self.sum(pixel, COVERAGE);
                 (coverage / count) as f32
+            })
+        })
+    }
+
+    /// Number of samples that were dropped since they were not finite, for each pixel, exact up to 2²⁴; `None` without AOVs.
+    pub fn dropped(&self) -> Option<Vec<f32>> {
+        self.aovs.then(|| {
+            self.map_pixels(|pixel| {
+                let [dropped] = self.sum(pixel, DROPPED);
+                dropped as f32
             })
         })
     }

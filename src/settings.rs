@@ -162,7 +162,7 @@ pub struct Settings {
     pub camera: Option<usize>,
     /// A light meter instead of the camera.
     pub sensor: Option<Sensor>,
-    /// Also average albedo, normal, depth and coverage of the first hit.
+    /// Also average albedo, normal, depth and coverage of the first hit, and count dropped samples for each pixel.
     pub aovs: bool,
 }
 

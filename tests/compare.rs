@@ -182,7 +182,8 @@ fn alarms_are_as_rare_as_they_should_be_for_renders() {
     }
 }
 
-/// 1 % more or less albedo of one material, at 128 × 128 pixels and 512 samples, is found at the default α.
+/// 1 % more or less albedo of one material, at 128 × 128 pixels and 512 samples, is found at the default α: at night in 38 of 40 pairs
+/// of each material at least.
 #[test]
 fn a_hundredth_of_an_albedo_is_found() {
     let original = scene("cornell.gltf");

@@ -156,7 +156,8 @@ fn films_become_layers() {
         let pixel = |k: f32| {
             let x = k * (1.0 + sample as f32);
             let radiance = [x, 2.0 * x, 3.0 * x, 0.0, 0.0, 0.0];
-            let first_hit = [0.1, 0.2, 0.3, 0.0, 0.0, 1.0, 5.0, 1.0];
+            // and one that was dropped
+            let first_hit = [0.1, 0.2, 0.3, 0.0, 0.0, 1.0, 5.0, 1.0, sample as f32];
             [&radiance[..], &first_hit[..]].concat()
         };
         let values = [pixel(1.0), pixel(10.0)].concat();
@@ -166,7 +167,7 @@ fn films_become_layers() {
     write_exr(&path, &image).unwrap();
     let back = read_exr(&path).unwrap();
     // samples 1 and 2 times k: mean 1.5 k, standard error √(0.5 / 2) k
-    let expected: [(&str, [f32; 2]); 8] = [
+    let expected: [(&str, [f32; 2]); 9] = [
         ("R", [1.5, 15.0]),
         ("B", [4.5, 45.0]),
         ("stderr.R", [0.5, 5.0]),
@@ -175,11 +176,12 @@ fn films_become_layers() {
         ("depth.Z", [5.0, 5.0]),
         ("coverage", [1.0, 1.0]),
         ("samples", [2.0, 2.0]),
+        ("dropped", [1.0, 1.0]),
     ];
     for (name, values) in expected {
         assert_eq!(back.channel(name).unwrap(), values, "{name}");
     }
-    assert_eq!(back.channels.len(), 3 + 3 + 3 + 1 + 1 + 3 + 1);
+    assert_eq!(back.channels.len(), 3 + 3 + 3 + 1 + 1 + 3 + 1 + 1);
 
     let bare = Film::new(window, (4, 2), false);
     assert!(Image::from_film(&bare, &[Aov::Albedo], Metadata::new()).is_err());

@@ -40,13 +40,15 @@ fn film(aovs: bool) -> Film {
 
 /// The leaf of one sample: its radiance, no deviation, its AOVs.
 fn leaf(sample: u64, aovs: bool) -> Vec<f32> {
-    let stride = if aovs { 14 } else { 6 };
+    let stride = if aovs { 15 } else { 6 };
     (0..PIXELS * stride)
         .map(|i| match i % stride {
             3..6 => 0.0,
             // a third of the samples miss: no depth, no coverage
             12 | 13 if sample % 3 == 0 => 0.0,
             13 => 1.0,
+            // of each pixel another share is dropped
+            14 => u8::from(hash(sample) % (2 + (i / stride) as u64) == 0).into(),
             _ => radiance(sample, i as u64),
         })
         .collect()
@@ -77,7 +79,10 @@ fn bits(film: &Film) -> Vec<u32> {
     for vectors in [film.albedo(), film.normal()].into_iter().flatten() {
         all.extend(vectors.as_flattened());
     }
-    for values in [film.depth(), film.coverage()].into_iter().flatten() {
+    for values in [film.depth(), film.coverage(), film.dropped()]
+        .into_iter()
+        .flatten()
+    {
         all.extend(values);
     }
     all.into_iter().map(f32::to_bits).collect()
@@ -223,11 +228,25 @@ fn small_deviations_on_a_large_mean_survive() {
     assert_eq!(film.standard_error()[0][0], expected);
 }
 
+/// Counts, however a render was split: those of all samples.
+#[test]
+fn dropped_samples_are_counted_for_each_pixel() {
+    let samples = 3..203;
+    let film = sequential(samples.clone(), true);
+    let counts = film.dropped().unwrap();
+    assert_eq!(counts.len(), PIXELS);
+    for (pixel, count) in counts.into_iter().enumerate() {
+        let is_dropped = |sample: &u64| leaf(*sample, true)[15 * pixel + 14] == 1.0;
+        assert_eq!(count as usize, samples.clone().filter(is_dropped).count());
+    }
+    assert!(sequential(0..4, false).dropped().is_none());
+}
+
 #[test]
 fn depth_averages_hits_and_misses_are_infinitely_far() {
     let mut film = film(true);
     for (sample, depth) in [2.0, 4.0, 0.0, 0.0].into_iter().enumerate() {
-        let mut values = vec![0.0; PIXELS * 14];
+        let mut values = vec![0.0; PIXELS * 15];
         if depth > 0.0 {
             // only the first pixel is ever hit
             values[6..9].copy_from_slice(&[0.5, 0.25, 1.0]);

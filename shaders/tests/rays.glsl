@@ -11,7 +11,6 @@ struct Hit { float t; vec2 bary; uint instance; uint primitive; uint record; };
 bool surface_is_opaque(uint instance, uint primitive, vec2 bary) {
     return (primitive & 1u) == 0u;
 }
-uvec2 surface_skip = uvec2(NONE);
 
 #ifdef TRAVERSE_PIPELINE
 #include "traverse_pipeline.glsl"

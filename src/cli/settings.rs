@@ -175,5 +175,6 @@ mod tests {
         let aovs = |line: &str| settings(&parse(line), &scene()).unwrap().aovs;
         assert!(!aovs("--aov stderr,samples"));
         assert!(aovs("--aov stderr,depth"));
+        assert!(aovs("--aov dropped"));
     }
 }

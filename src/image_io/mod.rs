@@ -89,17 +89,20 @@ pub enum Aov {
     StandardError,
     /// `samples`: number of samples.
     Samples,
+    /// `dropped`: how many of them were not finite and count as black.
+    Dropped,
 }
 
 impl Aov {
     /// Every AOV.
-    pub const ALL: [Self; 6] = [
+    pub const ALL: [Self; 7] = [
         Self::Albedo,
         Self::Normal,
         Self::Depth,
         Self::Coverage,
         Self::StandardError,
         Self::Samples,
+        Self::Dropped,
     ];
 
     /// The name on the command line and of the layer.
@@ -111,10 +114,11 @@ impl Aov {
             Self::Coverage => "coverage",
             Self::StandardError => "stderr",
             Self::Samples => "samples",
+            Self::Dropped => "dropped",
         }
     }
 
-    /// Whether the film must hold sums of the first hit ([`crate::settings::Settings::aovs`]).
+    /// Whether the film must hold the sums that only AOVs need ([`crate::settings::Settings::aovs`]): of the first hit, and of dropped samples.
     pub fn needs_first_hit(self) -> bool {
         !matches!(self, Self::StandardError | Self::Samples)
     }
@@ -206,6 +210,7 @@ fn push_aov(channels: &mut Vec<Channel>, film: &Film, aov: Aov) -> Option<()> {
         Aov::Depth => single("depth.Z", film.depth()?),
         Aov::Coverage => single("coverage", film.coverage()?),
         Aov::Samples => single("samples", vec![film.samples() as f32; film.pixels()]),
+        Aov::Dropped => single("dropped", film.dropped()?),
         Aov::Albedo => push_vectors(channels, names(rgb), film.albedo()?),
         Aov::Normal => push_vectors(channels, names(xyz), film.normal()?),
         Aov::StandardError => push_vectors(channels, names(rgb), film.standard_error()),

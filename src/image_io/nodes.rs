@@ -8,7 +8,7 @@ use crate::film::Film;
 const PREFIX: &str = "node.";
 
 /// The floats of a pixel in a node, in order; the first six where a film has no sums of the first hit.
-const PARTS: [&str; 14] = [
+const PARTS: [&str; 15] = [
     "sum.R",
     "sum.G",
     "sum.B",
@@ -23,6 +23,7 @@ const PARTS: [&str; 14] = [
     "normal.Z",
     "depth.Z",
     "coverage",
+    "dropped",
 ];
 
 impl Image {

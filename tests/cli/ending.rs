@@ -163,6 +163,39 @@ fn too_many_samples_that_are_not_finite_fail_the_render() {
     assert_eq!(allowed.status.code(), Some(0));
     assert!(stderr(&allowed).contains("not finite"));
     println!("{dropped} of 128 samples dropped: exit code 1");
+
+    // Pixel by pixel, whether in one go, from a checkpoint or from shards.
+    let line = "render scene.gltf --width 16 --height 8 --camera wide --max-dropped 1 --aov dropped,samples -q";
+    for run in [
+        format!("{line} -o whole.exr --samples 0..12"),
+        format!("{line} -o half.exr --spp 5 --checkpoint c"),
+        format!("{line} -o resumed.exr --spp 12 --checkpoint c --resume"),
+        format!("{line} -o a.exr --samples 0..5"),
+        format!("{line} -o b.exr --samples 5..12"),
+        String::from("merge b.exr a.exr -o merged.exr"),
+    ] {
+        let output = etendue(&run, folder.path());
+        assert_eq!(output.status.code(), Some(0), "{run}: {}", stderr(&output));
+    }
+    let whole = read(&folder, "whole.exr");
+    let counts = whole.channel("dropped").unwrap();
+    for (count, mean) in counts.iter().zip(whole.channel("R").unwrap()) {
+        assert!(
+            *count < 12.0 || *mean == 0.0,
+            "{count} of 12 dropped, mean {mean}"
+        );
+        assert!(*count >= 0.0 && *count <= 12.0 && count.fract() == 0.0);
+    }
+    assert!(counts.contains(&0.0) && counts.iter().any(|c| *c > 0.0));
+    let total: f32 = counts.iter().sum();
+    assert_eq!(f64::from(total), number(&whole, "ledger.non_finite"));
+    for other in ["resumed.exr", "merged.exr"] {
+        assert_eq!(read(&folder, other).channel("dropped").unwrap(), counts);
+    }
+    println!(
+        "{total} of 1536 samples dropped, {} of 128 pixels",
+        counts.iter().filter(|c| **c > 0.0).count()
+    );
 }
 
 #[test]

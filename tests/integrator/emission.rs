@@ -158,7 +158,10 @@ fn samples_that_overflow_are_counted() {
         device: None,
         validation: true,
     };
-    let settings = settings(8, 4);
+    let settings = Settings {
+        aovs: true,
+        ..settings(8, 4)
+    };
     let mut renderer = match Renderer::tuned(&scene, &settings, &options, Tuning::default()) {
         Ok(renderer) => renderer,
         Err(error) if is_device_required() => panic!("{error}"),
@@ -166,5 +169,6 @@ fn samples_that_overflow_are_counted() {
     };
     let film = renderer.render(&mut |_| Control::Continue).unwrap();
     assert_eq!(renderer.report().ledger.non_finite, 8 * 8 * 4);
+    assert_eq!(film.dropped().unwrap(), [4.0; 8 * 8]);
     assert!(film.mean().iter().flatten().all(|v| *v == 0.0));
 }

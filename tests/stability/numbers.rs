@@ -2,7 +2,7 @@
 
 use etendue::render::Tuning;
 use etendue::scene::{Phase, PunctualLight};
-use etendue::settings::{Settings, Strategy};
+use etendue::settings::{BackendChoice, Settings, Strategy};
 use glam::{DVec3, Vec3};
 
 use crate::common::*;
@@ -83,33 +83,84 @@ fn denormal_numbers_are_zeros() {
     assert!(off == 0.0, "{off}");
 }
 
-/// Plates that touch are one plate, but for the offset o of the ray at each boundary: along the normal, so that the ray
-/// goes on beside its line and meets the next face o sin²θ/cosθ early. Plates 18 m wide have o = 4e-6.
+/// Plates that touch are one plate. The factors of the plates are rounded, and so are their products: 2⁻²⁴ each.
 #[test]
 fn many_touching_plates_absorb_as_one() {
-    let plates = count(64, 1000);
+    let plates = count(64, 10_000);
     let medium = grey(1.0, 0.0, Phase::Isotropic);
-    let picture = |count: u64| {
-        let mut scene = empty();
-        for i in 0..count {
-            let at = |i: u64| -(i as f32) / count as f32;
-            add(
-                &mut scene,
-                block(Vec3::new(-9.0, -9.0, at(i + 1)), Vec3::new(9.0, 9.0, at(i))),
-                glass(1.0, medium),
-            );
-        }
-        scene.environment = constant_sky(1.0);
-        let (sin, cos) = 30f64.to_radians().sin_cos();
-        scene.cameras = vec![parallel(5.0 * DVec3::new(sin, 0.0, cos), DVec3::ZERO, 0.1)];
-        render(&scene, &settings(8, 4), Tuning::default())
+    let mut scene = empty();
+    for i in 0..plates {
+        let at = |i: u64| -(i as f32) / plates as f32;
+        add(
+            &mut scene,
+            block(Vec3::new(-9.0, -9.0, at(i + 1)), Vec3::new(9.0, 9.0, at(i))),
+            glass(1.0, medium),
+        );
+    }
+    scene.environment = constant_sky(1.0);
+    let (sin, cos) = 30f64.to_radians().sin_cos();
+    scene.cameras = vec![parallel(5.0 * DVec3::new(sin, 0.0, cos), DVec3::ZERO, 0.1)];
+    let truth = (-1.0 / cos).exp();
+    let Some(seen) = render(&scene, &settings(8, 4), Tuning::default()) else {
+        return;
     };
-    let Some(many) = picture(plates) else { return };
-    let truth = (-1.0 / 30f64.to_radians().cos()).exp();
-    let off = (mean_of(&many.film) / truth - 1.0).abs();
+    let off = (mean_of(&seen.film) / truth - 1.0).abs();
     println!("{plates} plates that touch: off by {off:.1e}");
-    let bound = 1.5e-6 * plates as f64;
-    assert!(off <= bound, "{} instead of {truth}", mean_of(&many.film));
+    let bound = plates as f64 * 2f64.powi(-23);
+    assert!(off <= bound, "off by {off} instead of {bound}");
+}
+
+/// Rays in the plane in which faces of two touching solids are cut into triangles, and rays along edges where four blocks of a
+/// grid meet, within 1e-6 of corners: every path knows what it is in. At night by each traversal, since each passes over faces in
+/// its own way; the device's ones need not be watertight.
+#[test]
+fn rays_along_edges_know_what_they_are_in() {
+    let side = count(8, 20) as i32;
+    let medium = grey(1.0, 0.0, Phase::Isotropic);
+    let mut scene = empty();
+    let at = |i: i32| i as f32 / side as f32 - 0.5;
+    for [x, y, z] in (0..side.pow(3)).map(|i| [i % side, i / side % side, i / side.pow(2)]) {
+        let low = Vec3::new(at(x), at(y), at(z));
+        let high = Vec3::new(at(x + 1), at(y + 1), at(z + 1));
+        add(&mut scene, block(low, high), glass(1.0, medium));
+    }
+    scene.environment = constant_sky(1.0);
+    let backends = [
+        BackendChoice::Bvh,
+        BackendChoice::RayQuery,
+        BackendChoice::RayPipeline,
+    ];
+    for &backend in &backends[..count(1, 3) as usize] {
+        for (what, direction) in [
+            ("diagonals", DVec3::new(1.0, 1.0, 2.5)),
+            ("diagonals", DVec3::new(-1.0, 1.0, 2.5)),
+            ("edges", DVec3::new(1.0, 1.0, 1.0)),
+            ("faces", DVec3::new(0.3, 0.8, 1.0)),
+        ] {
+            let d = direction.normalize();
+            scene.cameras = vec![parallel(3.0 * d, DVec3::ZERO, 1e-6)];
+            let settings = Settings {
+                backend,
+                ..settings(64, 1)
+            };
+            let Some(seen) = render(&scene, &settings, Tuning::default()) else {
+                return;
+            };
+            let truth = (-1.0 / d.abs().max_element()).exp();
+            let pixels = seen.film.mean();
+            let off = |p: &[f32; 3]| (f64::from(p[0]) / truth - 1.0).abs();
+            let largest = pixels.iter().map(off).fold(0.0, f64::max);
+            let lost = pixels.iter().filter(|p| off(p) > 1e-3).count();
+            let paths = pixels.len();
+            println!("{backend:?}, {what}: {lost} of {paths} paths lost, off by {largest:.1e}");
+            let allowed = if backend == BackendChoice::Bvh {
+                0
+            } else {
+                paths / 100
+            };
+            assert!(lost <= allowed, "{lost} lost");
+        }
+    }
 }
 
 /// Batches of paths with a thousand scatterings: none is long enough for a system to reset the device.
