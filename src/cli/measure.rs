@@ -78,7 +78,8 @@ pub fn run(args: &MeasureArgs) -> Result<Outcome, Failure> {
                 true => Control::Stop,
                 false => Control::Continue,
             };
-            film = renderer.resume(so_far, Work::default(), &[0..samples], &mut control)?;
+            let range = 0..samples;
+            film = renderer.resume(so_far, Work::default(), &[range], &mut control)?;
             if film.samples() < samples {
                 return Ok(None);
             }

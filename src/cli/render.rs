@@ -298,7 +298,8 @@ fn plan_samples(
         "{} other samples have a relative error of {error:.2e}: {needed} are needed",
         film.samples()
     ));
-    Ok(Vec::from([start..start + needed]))
+    let planned = start..start + needed;
+    Ok(vec![planned])
 }
 
 /// Renders until the first limit is reached.
