@@ -2,10 +2,13 @@
 
 use etendue::Error;
 use etendue::film::Film;
-use etendue::render::{Control, DeviceOptions, Renderer, Report, Tuning};
+use etendue::render::{Control, DeviceOptions, Renderer, Report, Tuning, Workshop};
 use etendue::scene::{Camera, Environment, Instance, Material, Mesh, Projection, Scene};
 use etendue::settings::{BackendChoice, Settings};
 use glam::{DAffine3, DMat3, DVec3, Vec2, Vec3};
+
+/// Half of the time of these tests would go into kernels that another test had before.
+pub static WORKSHOP: Workshop = Workshop::new();
 
 /// What came out of [`render`].
 pub struct Rendered {
@@ -36,7 +39,7 @@ pub fn open(scene: &Scene, settings: &Settings, tuning: Tuning) -> Option<Render
         validation: true,
     };
     let required = std::env::var_os("ETENDUE_REQUIRE_DEVICE").is_some_and(|value| value == "1");
-    match Renderer::tuned(scene, settings, &options, tuning) {
+    match Renderer::made_in(&WORKSHOP, scene, settings, &options, tuning) {
         Ok(renderer) => Some(renderer),
         Err(error @ Error::Unsupported { .. }) if !required => {
             println!("skipped: {error}");

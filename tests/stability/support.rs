@@ -8,6 +8,7 @@ use etendue::scene::Scene;
 use etendue::settings::{BackendChoice, Settings};
 use glam::{DVec3, Vec3};
 
+use crate::common::WORKSHOP;
 pub use crate::random::Random;
 pub use crate::statistics::Estimate;
 
@@ -45,7 +46,7 @@ pub fn open(scene: &Scene, settings: &Settings, tuning: Tuning) -> Option<Result
         validation: true,
     };
     let required = std::env::var_os("ETENDUE_REQUIRE_DEVICE").is_some_and(|value| value == "1");
-    match Renderer::tuned(scene, settings, &options, tuning) {
+    match Renderer::made_in(&WORKSHOP, scene, settings, &options, tuning) {
         Err(error @ Error::Unsupported { .. }) if !required => {
             println!("skipped: {error}");
             None

@@ -27,7 +27,7 @@ mod watertight;
 
 use etendue::Error;
 use etendue::film::Film;
-use etendue::render::{Control, DeviceOptions, Renderer, Tuning};
+use etendue::render::{Control, DeviceOptions, Renderer, Tuning, Workshop};
 use etendue::scene::Scene;
 use etendue::settings::{BackendChoice, Settings};
 
@@ -49,6 +49,9 @@ enum Levels {
     Two,
 }
 
+/// Kernels are compiled once.
+static WORKSHOP: Workshop = Workshop::new();
+
 /// A renderer under validation, or the printed reason why there is none.
 fn open(scene: &Scene, settings: &Settings, levels: Levels) -> Option<Renderer> {
     let options = DeviceOptions {
@@ -63,7 +66,7 @@ fn open(scene: &Scene, settings: &Settings, levels: Levels) -> Option<Renderer> 
         copy_limit,
         ..Tuning::default()
     };
-    match Renderer::tuned(scene, settings, &options, tuning) {
+    match Renderer::made_in(&WORKSHOP, scene, settings, &options, tuning) {
         Ok(renderer) => {
             assert_eq!(renderer.report().backend, settings.backend);
             Some(renderer)
