@@ -6,6 +6,7 @@ use etendue::settings::{Settings, Strategy};
 use glam::DVec3;
 
 use crate::common::*;
+use crate::tier::count;
 use crate::{BOTH, assert_mean, largest_deviation};
 
 /// The room −1 … 1 of `albedo` that emits 1 everywhere, seen from inside.
@@ -39,7 +40,8 @@ fn closed_room_sums_the_series() {
             max_depth,
             strategy,
             seed: 11,
-            ..settings(32, samples)
+            // By day chance keeps two fifths of the bound.
+            ..settings(32, count(samples.min(16).max(samples / 4), samples))
         };
         let Some(r) = render(&glowing_room(albedo), &settings, Tuning::default()) else {
             return;

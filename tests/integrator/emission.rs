@@ -7,6 +7,7 @@ use glam::{DVec3, Vec3};
 
 use crate::common::*;
 use crate::statistics::Estimate;
+use crate::tier::count;
 use crate::{BOTH, largest_deviation};
 
 const RADIANCE: f32 = 3.7;
@@ -91,7 +92,8 @@ fn only_the_front_emits_unless_double_sided() {
 /// A million samples of a sky do not drift: the sum is a tree.
 #[test]
 fn constant_sky_keeps_its_value_over_a_million_samples() {
-    for radiance in [0.1, 0.3, 0.7, 1e-3] {
+    // By day two, neither of them a sum of few powers of two.
+    for radiance in [0.1, 1e-3, 0.3, 0.7].into_iter().take(count(2, 4) as usize) {
         let mut scene = empty();
         scene.environment = constant_sky(radiance);
         scene.cameras = vec![pinhole(DVec3::Z, DVec3::ZERO, 40.0)];
@@ -158,11 +160,12 @@ fn samples_that_overflow_are_counted() {
         validation: true,
     };
     let settings = settings(8, 4);
-    let mut renderer = match Renderer::tuned(&scene, &settings, &options, Tuning::default()) {
-        Ok(renderer) => renderer,
-        Err(error) if device_required() => panic!("{error}"),
-        Err(error) => return println!("skipped: {error}"),
-    };
+    let mut renderer =
+        match Renderer::made_in(&WORKSHOP, &scene, &settings, &options, Tuning::default()) {
+            Ok(renderer) => renderer,
+            Err(error) if device_required() => panic!("{error}"),
+            Err(error) => return println!("skipped: {error}"),
+        };
     let film = renderer.render(&mut |_| Control::Continue).unwrap();
     assert_eq!(renderer.report().ledger.non_finite, 8 * 8 * 4);
     assert!(film.mean().iter().flatten().all(|v| *v == 0.0));
