@@ -8,8 +8,13 @@ cd "$(dirname "${BASH_SOURCE[0]}")/.."
 source scripts/setup.sh
 # A software driver must not look for a display.
 unset DISPLAY WAYLAND_DISPLAY
-# Nothing may pass by being skipped, and two tests must not share one device.
+# Nothing may pass by being skipped. Tests of a process run one after another: they share devices,
+# kernels and the memory that some of them measure.
 export ETENDUE_REQUIRE_DEVICE=1 RUST_TEST_THREADS=1
+# Compiling a kernel takes one core, rendering all of them: two processes keep two cores busy.
+readonly AT_ONCE=2
+# Those that take longest, first, so that none of them is left at the end.
+readonly LONGEST=(reference faults stability integrator matter work cli compare shading traversal fuzz measure)
 readonly WGPU_RUST_VERSION=1.87
 
 summary=()
@@ -44,14 +49,53 @@ validate_shaders() {
     echo "$count modules are valid"
 }
 
-run_tests() {
-    local log passed
-    log="$(mktemp)"
-    cargo test --release --locked "$@" 2>&1 | tee "$log" || { rm -f "$log"; return 1; }
-    passed="$(awk '/^test result: ok/ { n += $4 } END { print n + 0 }' "$log")"
-    rm -f "$log"
-    echo "$passed tests passed"
+# Where logs and the program with the feature faults are for as long as this runs.
+work="$(mktemp -d)"
+trap 'rm -rf "$work"' EXIT
+export work
+
+# The test binaries of a build, by cargo's messages.
+binaries() {
+    cargo test --release --locked --no-run --message-format=json-render-diagnostics "$@" >"$work/messages" || return 1
+    sed -nE 's/.*"profile":\{[^}]*"test":true\}.*"executable":"([^"]*)".*/\1/p' "$work/messages"
 }
+
+# These tests need a program that has the feature too. It lies where the others look for theirs, so it is put aside.
+build_faults() {
+    binaries --features faults --test faults >"$work/faults.list" || return 1
+    cp "$CARGO_TARGET_DIR/release/etendue" "$work/etendue-faults"
+}
+
+build_tests() { binaries >"$work/list" && [[ -s "$work/list" ]]; }
+
+# One binary; what it prints stays together. 255 ends xargs.
+run_binary() {
+    local name log="$work/log.${1##*-}" code=0
+    name="$(basename "${1%-*}")"
+    [[ "$name" != faults ]] || export ETENDUE_TEST_PROGRAM="$work/etendue-faults"
+    local TIMEFORMAT="-- $name: %0R s, %0U + %0S s of processor time"
+    { time CARGO=cargo "$1" >"$log" 2>&1; } 2>"$log.time" || code=255
+    flock "$work/lock" cat "$log.time" "$log"
+    return $code
+}
+export -f run_binary
+
+# The longest binaries first.
+ordered() {
+    local name
+    for name in "${LONGEST[@]}"; do grep "/$name-[0-9a-f]*\$" "$1"; done
+    grep -vE "/($(IFS='|' && echo "${LONGEST[*]}"))-[0-9a-f]*\$" "$1"
+}
+
+run_all() {
+    cat "$work/faults.list" "$work/list" >"$work/all"
+    ordered "$work/all" | xargs -P "$AT_ONCE" -I{} bash -c 'run_binary {}' || return 1
+    # cargo runs these itself
+    cargo test --release --locked --doc || return 1
+    awk '/^test result: ok/ { n += $4 } END { print n + 0, "tests passed" }' "$work"/log.*
+}
+
+run_some() { cargo test --release --locked "$@"; }
 
 document() { RUSTDOCFLAGS="-D warnings" cargo doc --release --no-deps --locked; }
 
@@ -73,20 +117,24 @@ if cargo clippy --version >/dev/null 2>&1; then
 else
     skip "lints: clippy is not installed (Debian package rust-clippy)"
 fi
-# Before the others, which then find the program without the feature.
-step "calls and files that fail do no harm" \
-    cargo test --release --locked --features faults --test faults
 # wgpu takes minutes to compile: its tests run every night, the gate looks at types and lints only.
 if ! at_least "$(rustc --version | cut -d' ' -f2)" "$WGPU_RUST_VERSION"; then
     skip "the feature wgpu: it needs Rust $WGPU_RUST_VERSION"
 elif [[ "${ETENDUE_NIGHTLY:-}" == 1 ]]; then
-    step "pictures through wgpu are the same (nightly)" run_tests --features wgpu --lib --test wgpu
+    step "pictures through wgpu are the same (nightly)" run_some --features wgpu --lib --test wgpu
 elif cargo clippy --version >/dev/null 2>&1; then
     step "no warnings with the feature wgpu (clippy)" cargo clippy --release --lib --bins --test wgpu --features wgpu --locked -- -D warnings
 else
     skip "the feature wgpu: clippy is not installed (Debian package rust-clippy)"
 fi
-step "every test passes, on a device (cargo test)" run_tests "$@"
+if (($# > 0)); then
+    step "the tests that were asked for (cargo test $*)" run_some "$@"
+else
+    # Before the others, which then find the program without the feature.
+    step "the tests of calls and files that fail are built" build_faults
+    step "the tests are built" build_tests
+    step "every test passes, on a device, $AT_ONCE at a time" run_all
+fi
 step "the documentation builds without warnings" document
 
 printf '\ntest.sh: everything passed in %d s\n' $((SECONDS - started))

@@ -10,6 +10,7 @@ use gpu_allocator::{AllocationSizes, AllocatorDebugSettings};
 use super::caps::{BUILD_EXTENSIONS, Caps, DeviceKind};
 use super::failed;
 use super::instance::{Instance, ValidationLog};
+use super::kept::Kept;
 use crate::error::{Error, Result};
 
 /// Memory is taken from the driver in blocks of this size; what is larger gets a
@@ -66,6 +67,7 @@ pub struct Device {
     ray_pipelines: Option<khr::ray_tracing_pipeline::Device>,
     names: Option<ash::ext::debug_utils::Device>,
     queue: Mutex<vk::Queue>,
+    pub(super) kept: Kept,
     caps: Caps,
     physical: vk::PhysicalDevice,
     root: Root,
@@ -125,6 +127,7 @@ impl Device {
                 .debug_utils
                 .then(|| ash::ext::debug_utils::Device::new(&instance.raw, raw)),
             queue: Mutex::new(queue),
+            kept: Kept::default(),
             caps,
             physical,
             root,
@@ -178,6 +181,17 @@ impl Device {
     /// The same list as an object that outlives the device.
     pub fn validation_log(&self) -> Arc<ValidationLog> {
         Arc::clone(&self.root.instance.log)
+    }
+
+    /// From here on each pipeline is compiled once and kept, and with it this device, until
+    /// [`Self::forget_pipelines`].
+    pub fn keep_pipelines(&self) {
+        self.kept.begin();
+    }
+
+    /// Lets go of the pipelines that were kept.
+    pub fn forget_pipelines(&self) {
+        self.kept.end();
     }
 
     pub(super) fn raw(&self) -> &ash::Device {

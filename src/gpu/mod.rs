@@ -29,6 +29,7 @@ mod device;
 #[doc(hidden)]
 pub mod faults;
 mod instance;
+mod kept;
 #[cfg(feature = "wgpu")]
 pub(crate) mod passthrough;
 mod pipeline;

@@ -9,6 +9,7 @@ use super::accel::Tlas;
 use super::buffer::Buffer;
 use super::device::Device;
 use super::failed;
+use super::kept::Recipe;
 use super::rays::ShaderTable;
 use crate::error::{Error, Result};
 
@@ -161,11 +162,14 @@ impl Pipeline {
     /// Compiles a compute shader. Fails with [`Error::Unsupported`] where the device
     /// cannot bind so much, and with [`Error::Vulkan`] where the driver refuses.
     pub fn compute(device: &Arc<Device>, desc: &PipelineDesc<'_>) -> Result<Self> {
-        let mut inner = PipelineInner::new(device, desc, vk::ShaderStageFlags::COMPUTE)?;
-        inner
-            .compile(desc)
-            .map_err(failed(format!("create pipeline \"{}\"", desc.name)))?;
-        Ok(inner.finish())
+        let make = || {
+            let mut inner = PipelineInner::new(device, desc, vk::ShaderStageFlags::COMPUTE)?;
+            inner
+                .compile(desc)
+                .map_err(failed(format!("create pipeline \"{}\"", desc.name)))?;
+            Ok(inner.finish())
+        };
+        device.kept.take_or(|| Recipe::new(desc, None), make)
     }
 
     pub(super) fn raw(&self) -> vk::Pipeline {

@@ -9,6 +9,7 @@ use super::buffer::{Buffer, Memory, Usage};
 use super::commands::Commands;
 use super::device::Device;
 use super::failed;
+use super::kept::Recipe;
 use super::pipeline::{BindSet, Constants, Module, Pipeline, PipelineDesc, PipelineInner};
 use crate::error::{Error, Result};
 
@@ -47,10 +48,15 @@ impl Pipeline {
         stages: &RayStages<'_>,
     ) -> Result<Self> {
         device.ray_pipelines()?;
-        let mut inner = PipelineInner::new(device, desc, STAGES)?;
-        inner.raw = create(device, desc, stages, inner.layout)?;
-        inner.table = Some(ShaderTable::new(device, desc.name, inner.raw)?);
-        Ok(inner.finish())
+        let make = || {
+            let mut inner = PipelineInner::new(device, desc, STAGES)?;
+            inner.raw = create(device, desc, stages, inner.layout)?;
+            inner.table = Some(ShaderTable::new(device, desc.name, inner.raw)?);
+            Ok(inner.finish())
+        };
+        device
+            .kept
+            .take_or(|| Recipe::new(desc, Some(stages)), make)
     }
 }
 

@@ -17,11 +17,13 @@ mod room;
 pub mod solids;
 mod team;
 mod traversal;
+mod tuning;
 mod upload;
 mod view;
 mod vulkan;
 #[cfg(feature = "wgpu")]
 mod wgpu;
+mod workshop;
 
 use std::ops::Range;
 use std::time::Instant;
@@ -38,6 +40,8 @@ pub use report::{
     Control, DeviceInfo, Feature, Ledger, Memory, Plan, Progress, Report, SceneModel, Times, Work,
 };
 pub use team::Team;
+pub use tuning::{Study, TraversalCounts, Tuning};
+pub use workshop::Workshop;
 
 #[cfg(feature = "wgpu")]
 use self::wgpu::WgpuBackend;
@@ -61,65 +65,6 @@ pub struct DeviceOptions {
     pub device: Option<String>,
     /// Runs the Khronos validation layer.
     pub validation: bool,
-}
-
-/// Details that do not change the picture; for tests and measurements.
-#[doc(hidden)]
-#[derive(Clone, Copy, Debug)]
-pub struct Tuning {
-    /// Most samples of a pass; a power of two.
-    pub max_pass: u64,
-    /// Most tiles of a batch.
-    pub max_tiles: u32,
-    /// Shared meshes are copied into world space up to so many triangles.
-    pub copy_limit: usize,
-    /// Compiles in everything, whether the scene needs it or not.
-    pub everything: bool,
-    /// Stands for the bytes that are free on the device.
-    pub device_bytes: Option<u64>,
-    /// Renders by a kernel that is slower and tells more.
-    pub study: Study,
-}
-
-/// Kernels for the limit report; for our own tree only.
-#[doc(hidden)]
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Study {
-    /// The kernel that everybody uses.
-    #[default]
-    None,
-    /// Traces every ray twice: the same image, later by the time that traversal takes.
-    Twice,
-    /// Counts what traversal does.
-    Counts,
-}
-
-/// What traversal did in a pass.
-#[doc(hidden)]
-#[derive(Clone, Copy, Debug, Default)]
-pub struct TraversalCounts {
-    pub rays: u64,
-    /// Nodes visited.
-    pub nodes: u64,
-    /// Leaf records read.
-    pub records: u64,
-    /// Steps that lanes made.
-    pub steps: u64,
-    /// Steps that all lanes of their subgroups had time for.
-    pub lane_steps: u64,
-}
-
-impl Default for Tuning {
-    fn default() -> Self {
-        Self {
-            max_pass: 1 << passes::MAX_PASS_LEVEL,
-            max_tiles: u32::MAX,
-            copy_limit: geometry::DEFAULT_COPY_LIMIT,
-            everything: false,
-            device_bytes: None,
-            study: Study::None,
-        }
-    }
 }
 
 /// Renders one scene with one group of settings on one device.
@@ -151,6 +96,28 @@ impl Renderer {
         options: &DeviceOptions,
         tuning: Tuning,
     ) -> Result<Self> {
+        Self::made(scene, settings, options, tuning, None)
+    }
+
+    /// As [`Self::tuned`], with devices and kernels that others had before.
+    #[doc(hidden)]
+    pub fn made_in(
+        workshop: &Workshop,
+        scene: &Scene,
+        settings: &Settings,
+        options: &DeviceOptions,
+        tuning: Tuning,
+    ) -> Result<Self> {
+        Self::made(scene, settings, options, tuning, Some(workshop))
+    }
+
+    fn made(
+        scene: &Scene,
+        settings: &Settings,
+        options: &DeviceOptions,
+        tuning: Tuning,
+        workshop: Option<&Workshop>,
+    ) -> Result<Self> {
         settings.validate()?;
         if let Some(camera) = settings.camera.filter(|c| *c >= scene.cameras.len()) {
             return Err(Error::Settings {
@@ -162,7 +129,7 @@ impl Renderer {
             });
         }
         let start = Instant::now();
-        let (device, choice, reason) = vulkan::open(settings.backend, options)?;
+        let (device, choice, reason) = vulkan::open(settings.backend, options, workshop)?;
         let mut data = SceneData::new(scene, settings, tuning.copy_limit);
         data.geometry.check()?;
         if tuning.everything {
@@ -483,7 +450,7 @@ pub fn model(scene: &Scene, settings: &Settings) -> Result<SceneModel> {
 /// As [`Renderer::new`].
 pub fn plan(scene: &Scene, settings: &Settings, options: &DeviceOptions) -> Result<Plan> {
     settings.validate()?;
-    let (device, backend, backend_reason) = vulkan::open(settings.backend, options)?;
+    let (device, backend, backend_reason) = vulkan::open(settings.backend, options, None)?;
     let data = SceneData::new(scene, settings, geometry::DEFAULT_COPY_LIMIT);
     let bvh = traversal::own_tree(backend, &data)?;
     let range = device.caps().max_storage_range;

@@ -7,7 +7,7 @@ use super::backend::{Backend, Batch, Frame, film_bytes, film_floats, read_ledger
 use super::room;
 use super::traversal::{GROUP, Traversal, build_scene, note_roots, own_tree, upload_bvh};
 use super::upload::SceneData;
-use super::{DeviceOptions, Ledger, Memory, TraversalCounts, Tuning};
+use super::{DeviceOptions, Ledger, Memory, TraversalCounts, Tuning, Workshop};
 use crate::error::{Error, Result};
 use crate::gpu::{
     self, BindSet, BindingKind, Buffer, Device, DeviceKind, DeviceRequest, Pipeline, Resource,
@@ -24,6 +24,7 @@ pub(super) const RECORDS: TexelFormat = TexelFormat::Rgba32Uint;
 pub(super) fn open(
     choice: BackendChoice,
     options: &DeviceOptions,
+    workshop: Option<&Workshop>,
 ) -> Result<(Arc<Device>, BackendChoice, String)> {
     let request = |choice| DeviceRequest {
         select: options.device.as_deref(),
@@ -31,14 +32,18 @@ pub(super) fn open(
         ray_query: choice == BackendChoice::RayQuery,
         ray_pipeline: choice == BackendChoice::RayPipeline,
     };
-    let device = Device::open(&request(choice))?;
+    let open = |choice| match workshop {
+        Some(workshop) => workshop.open(&request(choice)),
+        None => Device::open(&request(choice)),
+    };
+    let device = open(choice)?;
     if choice != BackendChoice::Auto {
         return Ok((device, choice, String::from("as asked")));
     }
     let caps = device.caps();
     if caps.ray_hardware_likely {
         drop(device);
-        let device = Device::open(&request(BackendChoice::RayQuery))?;
+        let device = open(BackendChoice::RayQuery)?;
         let reason = String::from("the device has ray query in hardware");
         return Ok((device, BackendChoice::RayQuery, reason));
     }

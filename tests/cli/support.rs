@@ -1,5 +1,6 @@
 //! Running the program, and a scene for it.
 
+use std::ffi::OsString;
 use std::fs;
 use std::path::Path;
 use std::process::{Child, Command, Output};
@@ -13,8 +14,15 @@ pub fn etendue(arguments: &str, folder: &Path) -> Output {
     command(arguments, folder).output().unwrap()
 }
 
+/// The program. `ETENDUE_TEST_PROGRAM` names another one: that with the feature `faults` for its tests, where that
+/// without it lies in its place by now.
+fn program() -> OsString {
+    let other = std::env::var_os("ETENDUE_TEST_PROGRAM");
+    other.unwrap_or_else(|| env!("CARGO_BIN_EXE_etendue").into())
+}
+
 pub fn command(arguments: &str, folder: &Path) -> Command {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_etendue"));
+    let mut command = Command::new(program());
     command
         .args(arguments.split_whitespace())
         .current_dir(folder)

@@ -2,13 +2,16 @@
 
 use etendue::Error;
 use etendue::film::Film;
-use etendue::render::{Control, DeviceOptions, Renderer, Report, Tuning};
+use etendue::render::{Control, DeviceOptions, Renderer, Report, Tuning, Workshop};
 use etendue::scene::{Camera, Environment, Instance, Material, Mesh, Projection, Scene};
 use etendue::settings::{BackendChoice, Settings};
 use glam::{DAffine3, DMat3, DVec3, Vec2, Vec3};
 
 #[allow(dead_code, reason = "not every test program asks for all")]
 pub mod backends;
+
+/// Half of the time of these tests would go into kernels that another test had before.
+pub static WORKSHOP: Workshop = Workshop::new();
 
 /// What came out of [`render`].
 pub struct Rendered {
@@ -38,7 +41,7 @@ pub fn open(scene: &Scene, settings: &Settings, tuning: Tuning) -> Option<Render
         device: None,
         validation: true,
     };
-    match Renderer::tuned(scene, settings, &options, tuning) {
+    match Renderer::made_in(&WORKSHOP, scene, settings, &options, tuning) {
         Ok(renderer) => Some(renderer),
         Err(error @ Error::Unsupported { .. }) if !backends::is_device_required() => {
             println!("skipped: {error}");

@@ -1,7 +1,7 @@
 //! A render is a pure function of the scene and the settings, to the bit.
 
 use etendue::film::Film;
-use etendue::render::{Control, DeviceOptions, Renderer, Study, Tuning};
+use etendue::render::{Control, DeviceOptions, Renderer, Study, Tuning, Workshop};
 use etendue::scene::{LightKind, PunctualLight, Scene};
 use etendue::settings::{BackendChoice, Crop, Settings};
 use glam::{DVec3, Vec3};
@@ -138,6 +138,42 @@ fn a_renderer_that_starts_again_is_as_good_as_a_new_one() {
         let again = renderer.render(&mut |_| Control::Continue).unwrap();
         assert!(bits(&again) == bits(&fresh), "{backend:?}");
         assert!(renderer.restart(3..3, 0).is_err());
+    }
+}
+
+/// Devices and kernels that others used, and still use, change nothing.
+#[test]
+fn a_workshop_changes_no_bit_of_a_picture() {
+    let options = DeviceOptions {
+        device: None,
+        validation: true,
+    };
+    for backend in offered() {
+        let settings = plain(backend);
+        let Some(shared) = film(&settings, Tuning::default()) else {
+            continue;
+        };
+        let picture = |workshop: Option<&Workshop>| {
+            let (scene, tuning) = (corner(), Tuning::default());
+            let made = match workshop {
+                Some(w) => Renderer::made_in(w, &scene, &settings, &options, tuning),
+                None => Renderer::tuned(&scene, &settings, &options, tuning),
+            };
+            let mut renderer = made.unwrap();
+            let film = renderer.render(&mut |_| Control::Continue).unwrap();
+            (bits(&film), renderer)
+        };
+        let (alone, _) = picture(None);
+        let workshop = Workshop::new();
+        let (first, one) = picture(Some(&workshop));
+        let (second, other) = picture(Some(&workshop));
+        drop(one);
+        let (third, _) = picture(Some(&workshop));
+        let same = [bits(&shared), first, second, third];
+        assert!(same.iter().all(|b| *b == alone), "{backend:?}");
+        // The last renderer has the device to itself.
+        drop(workshop);
+        assert_eq!(other.validation_messages(), Vec::<String>::new());
     }
 }
 

@@ -7,6 +7,7 @@ use glam::{DVec3, Vec3};
 
 use crate::common::backends::pair;
 use crate::common::*;
+use crate::tier::count;
 use crate::{assert_channels, block, glass, grey};
 
 fn point_light(position: DVec3, intensity: f32) -> PunctualLight {
@@ -71,7 +72,7 @@ fn single_scattering_of_a_point_light() {
             scene.cameras = vec![parallel(from, DVec3::ZERO, 1e-5)];
             let settings = Settings {
                 max_depth: 1,
-                ..settings(16, 16384)
+                ..settings(16, count(4096, 16_384))
             };
             let Some(r) = render(&scene, &settings, Tuning::default()) else {
                 return;

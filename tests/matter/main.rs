@@ -15,6 +15,8 @@ mod common;
 mod solids;
 #[path = "../common/statistics.rs"]
 mod statistics;
+#[path = "../common/tier.rs"]
+mod tier;
 
 mod closed;
 mod cube;
@@ -40,6 +42,14 @@ fn oblique(degrees: f64, half: f64) -> etendue::scene::Camera {
 /// Mean of one channel over the pixels.
 fn channel_mean(film: &Film, channel: usize) -> Estimate {
     Estimate::of_film(film, &[channel])
+}
+
+/// As many samples as that, in whole passes.
+fn samples_for(enough: f64) -> u64 {
+    match enough.ceil() as u64 {
+        few @ ..256 => few.next_power_of_two().max(16),
+        many => many.next_multiple_of(256),
+    }
 }
 
 /// Every channel's mean is its truth within the relative bound `delta`, chance included.

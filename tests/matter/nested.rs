@@ -7,6 +7,7 @@ use glam::Vec3;
 
 use crate::common::backends::pair;
 use crate::common::*;
+use crate::tier::count;
 use crate::{block, channel_mean, fresnel, glass, grey, oblique};
 
 /// Transmittance of glass, liquid and glass in layers, where `touch` tells for the liquid's faces whether
@@ -82,7 +83,7 @@ fn liquid_between_panes_does_not_depend_on_the_overlap() {
                 scene.cameras = vec![oblique(degrees, 0.1)];
                 let settings = Settings {
                     backend,
-                    ..settings(16, 4096)
+                    ..settings(16, count(512, 4096))
                 };
                 let what = format!("{backend:?}, {degrees}°, overlap {overlap}");
                 assert_transmits(&what, &scene, &settings, truth);

@@ -8,7 +8,8 @@ use glam::{DVec3, Vec3};
 
 use crate::common::backends::pair;
 use crate::common::*;
-use crate::{assert_channels, block, channel_mean, glass, grey, oblique};
+use crate::tier::count;
+use crate::{assert_channels, block, channel_mean, glass, grey, oblique, samples_for};
 
 /// A layer below z = 0 without an index of refraction, wide enough to be infinite.
 fn layer(thickness: f32) -> etendue::scene::Mesh {
@@ -49,7 +50,7 @@ fn thin_layer_scatters_sunlight_once() {
             let settings = Settings {
                 max_depth: 1,
                 backend,
-                ..settings(32, 16384)
+                ..settings(32, count(1024, 16_384))
             };
             let Some(r) = render(&scene, &settings, Tuning::default()) else {
                 return;
@@ -93,7 +94,7 @@ fn half_space_is_chandrasekhars() {
         scene.cameras = vec![oblique(degrees, 0.5)];
         let truth = 1.0 - (1.0 - albedo).sqrt() * h_function(albedo, degrees.to_radians().cos());
         let paths = truth * (1.0 - truth) * (8.4 / delta).powi(2);
-        let settings = settings(32, ((paths / 1024.0) as u64).next_power_of_two());
+        let settings = settings(32, samples_for(paths / 1024.0 / count(2, 1) as f64));
         let Some(r) = render(&scene, &settings, Tuning::default()) else {
             return;
         };

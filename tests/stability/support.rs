@@ -8,6 +8,7 @@ use etendue::scene::Scene;
 use etendue::settings::Settings;
 use glam::{DVec3, Vec3};
 
+use crate::common::WORKSHOP;
 use crate::common::backends::is_device_required;
 pub use crate::common::backends::pair;
 pub use crate::random::Random;
@@ -43,7 +44,7 @@ pub fn open(scene: &Scene, settings: &Settings, tuning: Tuning) -> Option<Result
         device: None,
         validation: true,
     };
-    match Renderer::tuned(scene, settings, &options, tuning) {
+    match Renderer::made_in(&WORKSHOP, scene, settings, &options, tuning) {
         Err(error @ Error::Unsupported { .. }) if !is_device_required() => {
             println!("skipped: {error}");
             None

@@ -29,7 +29,7 @@ mod watertight;
 
 use etendue::Error;
 use etendue::film::Film;
-use etendue::render::{Control, DeviceOptions, Renderer, Tuning};
+use etendue::render::{Control, DeviceOptions, Renderer, Tuning, Workshop};
 use etendue::scene::Scene;
 use etendue::settings::{BackendChoice, Settings};
 
@@ -41,6 +41,9 @@ enum Levels {
     /// Every mesh that is placed more than once keeps a group of its own.
     Two,
 }
+
+/// Kernels are compiled once.
+static WORKSHOP: Workshop = Workshop::new();
 
 /// A renderer under validation, or the printed reason why there is none.
 fn open(scene: &Scene, settings: &Settings, levels: Levels) -> Option<Renderer> {
@@ -56,7 +59,7 @@ fn open(scene: &Scene, settings: &Settings, levels: Levels) -> Option<Renderer> 
         copy_limit,
         ..Tuning::default()
     };
-    match Renderer::tuned(scene, settings, &options, tuning) {
+    match Renderer::made_in(&WORKSHOP, scene, settings, &options, tuning) {
         Ok(renderer) => {
             assert_eq!(renderer.report().backend, settings.backend);
             Some(renderer)
