@@ -111,7 +111,7 @@ fn a_dry_run_says_what_a_render_takes() {
         let message = stderr(&output);
         assert_eq!(output.status.code(), Some(1), "{message}");
         assert!(
-            message.contains("host memory free, needs 721554505728 bytes"),
+            message.contains("host memory free, needs 773094113280 bytes"),
             "{message}"
         );
     }
