@@ -26,7 +26,7 @@ bool trace_send(uint flags, vec3 origin, vec3 dir, float t_min, float t_max) {
     flags |= HAS_CANDIDATES ? gl_RayFlagsNoneEXT : gl_RayFlagsOpaqueEXT;
     // Without a closest-hit shader nobody changes the distance of what was met.
     trace_payload.t = 0.0;
-    if (HAS_NESTED) trace_payload.skip = surface_skip;
+    if (HAS_NESTED) payload_put(trace_payload, surface_skip);
     traceRayEXT(scene, flags, TRACE_ALL, 0u, 0u, 0u, origin, t_min, dir, t_max, 0);
     return trace_payload.t >= 0.0;
 }
