@@ -65,19 +65,21 @@ pub fn run(args: &MeasureArgs) -> Result<Outcome, Failure> {
     let mut renderer = Renderer::new(&scene, &settings, &device)?;
     interrupt.begin_rendering();
     let begun = Instant::now();
-    let is_late = || {
+    let has_taken = |share: f64| {
         let time = args.time.unwrap_or(f64::INFINITY);
-        begun.elapsed().as_secs_f64() >= time
+        begun.elapsed().as_secs_f64() >= share * time
     };
+    let pilot_share = 1.0 / pilot::MOST as f64;
     if let Some(limit) = args.noise {
         let mut film = Film::of(&settings);
         renderer.restart(settings.samples.clone(), pilot::seed(args.seed))?;
         let needed = pilot::plan(limit, settings.samples.end, |samples| {
             let so_far = std::mem::replace(&mut film, Film::of(&settings));
-            let mut control = |_: &Progress| match interrupt.is_requested() || is_late() {
-                true => Control::Stop,
-                false => Control::Continue,
-            };
+            let mut control =
+                |_: &Progress| match interrupt.is_requested() || has_taken(pilot_share) {
+                    true => Control::Stop,
+                    false => Control::Continue,
+                };
             let range = 0..samples;
             film = renderer.resume(so_far, Work::default(), &[range], &mut control)?;
             if film.samples() < samples {
@@ -92,7 +94,7 @@ pub fn run(args: &MeasureArgs) -> Result<Outcome, Failure> {
     let mut is_interrupted = false;
     let film = renderer.render(&mut |progress| {
         is_interrupted = interrupt.is_requested();
-        match is_interrupted || (progress.samples_done > 0 && is_late()) {
+        match is_interrupted || (progress.samples_done > 0 && has_taken(1.0)) {
             true => Control::Stop,
             false => Control::Continue,
         }

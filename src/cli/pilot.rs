@@ -9,8 +9,8 @@ const BLOCK: u64 = 16;
 const LEAST: u64 = 2 * BLOCK;
 /// A pilot ends when its error is at most this many times the limit: it then has about a ninth of the samples …
 const ENOUGH: f64 = 3.0;
-/// … or a ninth of the most that may be rendered.
-const MOST: u64 = 9;
+/// … or a ninth of the most that may be rendered, or of the time for all.
+pub const MOST: u64 = 9;
 /// The error to aim at, as a share of the limit: the pilot's error is known to a few percent.
 const AIM: f64 = 0.92;
 /// Mixed into the seed: the pilot's samples are independent of those of the render.
@@ -28,6 +28,9 @@ pub fn plan(
     total: u64,
     mut error_of: impl FnMut(u64) -> Result<Option<f64>>,
 ) -> Result<Option<u64>> {
+    if total <= LEAST {
+        return Ok(Some(total));
+    }
     let most = (total / MOST).max(LEAST);
     let mut samples = LEAST;
     loop {

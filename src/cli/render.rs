@@ -55,17 +55,7 @@ pub fn repeat(args: &RenderArgs, repeats: Option<&Repeat>) -> Result<Outcome, Fa
     let (film, work) = begin(&job, saved, &renderer.report(), &reporter)?;
 
     interrupt.begin_rendering();
-    let rendered = plan_samples(&mut renderer, &job, &interrupt, &reporter).and_then(|samples| {
-        let begun = (film, work);
-        render(
-            &mut renderer,
-            &job,
-            begun,
-            &samples,
-            &interrupt,
-            &mut reporter,
-        )
-    });
+    let rendered = render(&mut renderer, &job, film, work, &interrupt, &mut reporter);
     let (film, stop, cost) =
         rendered.map_err(|error| rescue(error, &mut renderer, &job, &reporter))?;
     interrupt.begin_writing();
@@ -256,6 +246,7 @@ fn introduce(reporter: &Reporter, job: &Job, renderer: &Team) {
 fn plan_samples(
     renderer: &mut Team,
     job: &Job,
+    begun: Instant,
     interrupt: &Interrupt,
     reporter: &Reporter,
 ) -> Result<Vec<Range<u64>>> {
@@ -269,9 +260,8 @@ fn plan_samples(
         ..job.settings.clone()
     };
     renderer.restart(pilot.samples.clone(), pilot.seed)?;
-    let begun = Instant::now();
     let is_late = || {
-        let time = job.args.time.unwrap_or(f64::INFINITY);
+        let time = job.args.time.unwrap_or(f64::INFINITY) / pilot::MOST as f64;
         interrupt.is_requested() || begun.elapsed().as_secs_f64() >= time
     };
     let mut film = Film::of(&pilot);
@@ -306,19 +296,21 @@ fn plan_samples(
 fn render(
     renderer: &mut Team,
     job: &Job,
-    (film, before): (Film, Work),
-    samples: &[Range<u64>],
+    film: Film,
+    before: Work,
     interrupt: &Interrupt,
     reporter: &mut Reporter,
 ) -> Result<(Film, Stop, Cost)> {
+    let begun = Instant::now();
+    let samples = plan_samples(renderer, job, begun, interrupt, reporter)?;
     let mut stop = Stop::Samples;
     let mut keeper = Keeper::new(job, &renderer.report());
-    let film = renderer.resume(film, before, samples, &mut |progress| {
+    let film = renderer.resume(film, before, &samples, &mut |progress| {
         reporter.update(progress);
         stop = if interrupt.is_requested() {
             Stop::Interrupt
         } else {
-            limit(job.args, progress)
+            limit(job.args, progress, begun)
         };
         if stop != Stop::Samples {
             return Control::Stop;
@@ -329,7 +321,7 @@ fn render(
         }
         Control::Continue
     })?;
-    if film.missing(samples).is_empty() {
+    if film.missing(&samples).is_empty() {
         stop = match job.args.noise {
             Some(limit) if !film.missing(&job.samples()).is_empty() => Stop::Noise(limit),
             // the limit came with the last sample: nothing was cut short
@@ -369,13 +361,13 @@ fn rescue(error: Error, renderer: &mut Team, job: &Job, reporter: &Reporter) -> 
 }
 
 /// Which limit of the arguments has been reached, if any.
-fn limit(args: &RenderArgs, progress: &Progress) -> Stop {
+fn limit(args: &RenderArgs, progress: &Progress, begun: Instant) -> Stop {
     let samples = progress.film.samples();
     if samples == 0 {
         return Stop::Samples;
     }
     if let Some(limit) = args.time {
-        if progress.elapsed.as_secs_f64() >= limit {
+        if begun.elapsed().as_secs_f64() >= limit {
             return Stop::Time(limit);
         }
     }
