@@ -6,6 +6,17 @@
 pub const SHADERS: &[(&str, &[&str], &str)] = &[
     ("kernel.comp", &["TRAVERSE_SOFTWARE"], "path_software"),
     ("kernel.comp", &["TRAVERSE_QUERY"], "path_query"),
+    // the same for scenes of opaque surfaces
+    (
+        "kernel.comp",
+        &["TRAVERSE_SOFTWARE", "PLAIN"],
+        "path_software_plain",
+    ),
+    (
+        "kernel.comp",
+        &["TRAVERSE_QUERY", "PLAIN"],
+        "path_query_plain",
+    ),
     // for the limit report
     (
         "kernel.comp",
@@ -30,6 +41,11 @@ pub const SHADERS: &[(&str, &[&str], &str)] = &[
     // as path_software, with what wgpu lacks left out
     ("kernel.comp", &["TRAVERSE_SOFTWARE", "WGPU"], "path_wgpu"),
     ("kernel.rgen", &["TRAVERSE_PIPELINE"], "path_pipeline"),
+    (
+        "kernel.rgen",
+        &["TRAVERSE_PIPELINE", "PLAIN"],
+        "path_pipeline_plain",
+    ),
     (
         "kernel.rgen",
         &["TRAVERSE_PIPELINE", "KERNEL_PROBE"],

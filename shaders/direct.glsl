@@ -55,6 +55,7 @@ struct Shadow {
     Interior interior;
     Ray ray;
     uint from;       // record of the hit that the ray leaves, or NONE
+    uint to;         // triangle that emits the light, or NONE
     float lead;      // metres that the ray starts ahead of what it left
     float t_max;
     bool is_infinite;
@@ -63,7 +64,7 @@ struct Shadow {
 
 Shadow shadow_none()
 {
-    return Shadow(false, vec3(0.0), interior_empty(), Ray(vec3(0.0), vec3(0.0)), NONE, 0.0, 0.0, false, vec3(0.0));
+    return Shadow(false, vec3(0.0), interior_empty(), Ray(vec3(0.0), vec3(0.0)), NONE, NONE, 0.0, 0.0, false, vec3(0.0));
 }
 
 // Sends the shadow ray on from `origin`. It aims at the light anew: a step off a large
@@ -85,7 +86,7 @@ void shadow_aim(inout Shadow s, vec3 origin)
 
 Shadow shadow_of(Interior interior, vec3 origin, uint from, LightSample light, vec3 value)
 {
-    Shadow s = Shadow(true, value, interior, Ray(origin, light.wi), from, 0.0, 0.0, light.is_infinite, light.target);
+    Shadow s = Shadow(true, value, interior, Ray(origin, light.wi), from, light.triangle, 0.0, 0.0, light.is_infinite, light.target);
     shadow_aim(s, origin);
     return s;
 }
@@ -95,7 +96,7 @@ vec3 shadow_arrives(Shadow s, inout uint rays)
 {
     if (s.t_max > 0.0) {
         rays++;
-        if (trace_occluded(s.ray.origin, s.ray.direction, 0.0, s.t_max, s.from)) {
+        if (trace_occluded(s.ray.origin, s.ray.direction, 0.0, s.t_max, s.from, s.to)) {
             return vec3(0.0);
         }
     }

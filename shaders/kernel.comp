@@ -4,6 +4,9 @@
 #extension GL_GOOGLE_include_directive : require
 #extension GL_KHR_shader_subgroup_arithmetic : require
 #extension GL_KHR_shader_subgroup_vote : require
+#ifdef TRAVERSE_SOFTWARE
+#extension GL_EXT_control_flow_attributes : require
+#endif
 #ifdef TRAVERSE_QUERY
 #extension GL_EXT_ray_query : require
 #endif

@@ -52,6 +52,7 @@ void main()
         return;
     }
     uvec2 pixel = uvec2(params.window_x, params.window_y) + at;
+    trace_start();
     FilmNode levels[FILM_LEVELS];
     uint rays = 0u;
     uint truncated = 0u;

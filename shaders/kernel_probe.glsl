@@ -14,13 +14,14 @@ void main()
     if (i >= batch.sample_count) {
         return;
     }
+    trace_start();
     ProbeRay ray = probe_rays[i];
     if (HAS_NESTED) {
         surface_skip_triangle(uvec2(NONE));
     }
     Hit hit;
     bool is_hit = trace_closest(ray.origin, ray.direction, ray.t_min, ray.t_max, ray.from, hit);
-    bool is_occluded = trace_occluded(ray.origin, ray.direction, ray.t_min, ray.t_max, ray.from);
+    bool is_occluded = trace_occluded(ray.origin, ray.direction, ray.t_min, ray.t_max, ray.from, NONE);
     ProbeHit result = ProbeHit(-1.0, vec2(0.0), NONE, NONE, NONE, is_occluded ? 1u : 0u);
     if (is_hit) {
         result = ProbeHit(hit.t, hit.bary, hit.instance, hit.primitive, hit.record, is_occluded ? 1u : 0u);

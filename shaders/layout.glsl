@@ -48,6 +48,9 @@ struct Params {
     uint light_nodes;        // texels in `lights`: of the root …
     uint light_keys;         // … and of the first key
     uint light_key_count;    // emissive triangles
+    // With flat pieces (PARALLELOGRAM_COUNT, TRIANGLE_COUNT):
+    vec3 planes_center;      // where their coordinates start
+    vec3 planes_extent;      // distance from there, along each axis, at which rays may start
 };
 
 // --- Push constants: one per batch -----------------------------------------
@@ -97,6 +100,27 @@ const uint TRIANGLE_IS_MASKED = 0x10000000u;
 
 // `vertices` holds two texels each: (position, u), (normal, v).
 // `attributes`, when present, three texels for each vertex: tangent, colour, (u1, v1, 0, 0).
+
+// A parallelogram or a triangle of the own BVH, whose rays are tested against all of them (traverse_planes.glsl).
+// A position, from Params.planes_center, is on it where normal · p + offset = 0 and its coordinates u · p + u_offset and
+// v · p + v_offset are between -1 and 1, or are weights of the second and third corner.
+struct Plane {
+    vec3 normal;              // unit
+    float offset;             // metres
+    vec3 u;                   // 1/m
+    float u_offset;
+    vec3 v;                   // 1/m
+    float v_offset;
+    float t_error;            // bound on the error of a distance, for rays along the normal, metres
+    float edge_error;         // the same of coordinates
+    uint record;              // names what lies in its plane, as Hit.record
+    uint first_triangle;      // of the group …
+    uint second_triangle;     // … and the other half; the same where there is none
+    uint reserved_0;
+    uint reserved_1;
+    uint reserved_2;
+};
+const uint PLANES_MAX = 32u;
 
 // --- Materials ---------------------------------------------------------------
 
@@ -292,5 +316,6 @@ const uint BIND_BVH_TRIANGLES = 15u; // texel buffer RGBA32UI, three texels a tr
 const uint BIND_MEDIA = 16u;         // texel buffer RGBA32UI: Medium[]
 const uint BIND_PROBE_RAYS = 17u;    // storage: ProbeRay[] (probe kernel)
 const uint BIND_PROBE_HITS = 18u;    // storage: ProbeHit[] (probe kernel)
+const uint BIND_PLANES = 19u;        // uniform buffer: Plane[PLANES_MAX] (own BVH)
 
 #endif

@@ -16,6 +16,7 @@
 struct LightSample {
     vec3 target;     // where the light is; unused when it is infinitely far
     vec3 wi;         // unit direction to it
+    uint triangle;   // that emits it, in `triangles`; NONE
     bool is_infinite;
     bool is_delta;   // no BSDF sample can find it
     vec3 radiance;   // delta lights: irradiance on a surface that faces wi
@@ -41,6 +42,7 @@ LightSample light_sample_triangle(Light light, vec3 from, vec2 u, float choice)
 {
     LightSample s;
     s.pdf = 0.0;
+    s.triangle = light.triangle;
     s.is_infinite = false;
     s.is_delta = false;
     vec2 bary = sample_triangle(u);
@@ -82,6 +84,7 @@ LightSample light_sample_triangle(Light light, vec3 from, vec2 u, float choice)
 LightSample light_sample_punctual(Light light, vec3 from, float choice)
 {
     LightSample s;
+    s.triangle = NONE;
     s.is_delta = true;
     s.is_infinite = light.kind == LIGHT_DIRECTIONAL;
     s.target = light.position;
@@ -164,6 +167,7 @@ LightSample light_from(LightChoice c, vec3 from, vec4 u)
 {
     LightSample s;
     s.pdf = 0.0;
+    s.triangle = NONE;
     s.is_infinite = true;
     if (HAS_ENVIRONMENT && c.is_environment) {
         EnvironmentSample e = environment_sample(vec3(c.u, u.yz), u.w);

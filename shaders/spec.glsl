@@ -15,6 +15,17 @@ layout(constant_id = 7) const bool HAS_AREA_LIGHTS = true; // emissive triangles
 layout(constant_id = 8) const bool HAS_PUNCTUAL = true;    // point, spot, directional
 layout(constant_id = 9) const bool HAS_INSTANCES = true;   // groups that are not in world space
 layout(constant_id = 10) const bool HAS_AOVS = true;
+#ifdef PLAIN
+// Scenes of opaque surfaces: what drivers need not read they need not prune at every start.
+const bool HAS_DIELECTRIC = false;
+const bool HAS_PASSAGE = false;
+const bool HAS_NESTED = false;
+const bool HAS_INSIDE = false;
+const bool HAS_MEDIA = false;
+const bool HAS_SCATTERING = false;
+const bool HAS_EQUIANGULAR = false;
+const bool HAS_SENSOR = false;
+#else
 layout(constant_id = 11) const bool HAS_DIELECTRIC = true; // any material that transmits
 layout(constant_id = 12) const bool HAS_PASSAGE = true;    // shadow rays go through surfaces that let light straight through
 layout(constant_id = 13) const bool HAS_NESTED = true;     // solids that may overlap or touch
@@ -23,9 +34,13 @@ layout(constant_id = 15) const bool HAS_MEDIA = true;      // anything that abso
 layout(constant_id = 16) const bool HAS_SCATTERING = true; // media that scatter
 layout(constant_id = 17) const bool HAS_EQUIANGULAR = true; // distances in them are also sampled by the lights
 layout(constant_id = 18) const bool HAS_SENSOR = true;      // a light meter that is no camera
+#endif
 layout(constant_id = 19) const bool HAS_STRATA = false;     // samples of a block are a net, not independent
 layout(constant_id = 20) const bool HAS_LIGHT_TREE = false; // lights are chosen by where they are needed
 layout(constant_id = 21) const uint STRATEGY = 0u;         // STRATEGY_*
+// Flat pieces that are all tested before the own tree is walked (traverse_planes.glsl): the first ones, and the others.
+layout(constant_id = 22) const uint PARALLELOGRAM_COUNT = 0u;
+layout(constant_id = 23) const uint TRIANGLE_COUNT = 0u;
 
 // Traversals ask surface_is_opaque of triangles that are marked.
 const bool HAS_CANDIDATES = HAS_ALPHA || HAS_NESTED;

@@ -31,6 +31,8 @@ bool trace_send(uint flags, vec3 origin, vec3 dir, float t_min, float t_max) {
     return trace_payload.t >= 0.0;
 }
 
+void trace_start() {}
+
 bool trace_closest(vec3 origin, vec3 dir, float t_min, float t_max, uint from, out Hit hit) {
     hit = Hit(-1.0, vec2(0.0), NONE, NONE, NONE);
     if (!trace_send(gl_RayFlagsNoneEXT, origin, dir, t_min, t_max)) return false;
@@ -38,7 +40,7 @@ bool trace_closest(vec3 origin, vec3 dir, float t_min, float t_max, uint from, o
     return true;
 }
 
-bool trace_occluded(vec3 origin, vec3 dir, float t_min, float t_max, uint from) {
+bool trace_occluded(vec3 origin, vec3 dir, float t_min, float t_max, uint from, uint to) {
     uint flags = gl_RayFlagsTerminateOnFirstHitEXT | gl_RayFlagsSkipClosestHitShaderEXT;
     return trace_send(flags, origin, dir, t_min, t_max);
 }

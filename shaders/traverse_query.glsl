@@ -33,6 +33,8 @@ void query_finish(rayQueryEXT query) {
     }
 }
 
+void trace_start() {}
+
 bool trace_closest(vec3 origin, vec3 dir, float t_min, float t_max, uint from, out Hit hit) {
     hit = Hit(-1.0, vec2(0.0), NONE, NONE, NONE);
     if (!query_is_valid(t_min, t_max)) return false;
@@ -48,7 +50,7 @@ bool trace_closest(vec3 origin, vec3 dir, float t_min, float t_max, uint from, o
     return true;
 }
 
-bool trace_occluded(vec3 origin, vec3 dir, float t_min, float t_max, uint from) {
+bool trace_occluded(vec3 origin, vec3 dir, float t_min, float t_max, uint from, uint to) {
     if (!query_is_valid(t_min, t_max)) return false;
     uint flags = gl_RayFlagsTerminateOnFirstHitEXT | (HAS_CANDIDATES ? gl_RayFlagsNoneEXT : gl_RayFlagsOpaqueEXT);
     rayQueryEXT query;

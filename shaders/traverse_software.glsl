@@ -255,7 +255,7 @@ uint bvh_lane_steps = 0u; // of all lanes of the subgroup, idle ones included; c
 #endif
 
 // Both traversals; `any_hit` ends at the first hit and is a literal at both calls.
-bool bvh_trace(vec3 origin, vec3 dir, float t_min, float t_max, uint from, bool any_hit, out Hit hit) {
+void bvh_trace(vec3 origin, vec3 dir, float t_min, float t_max, uint from, bool any_hit, out Hit hit) {
     bvh_height = 0u;
     bvh_newest = uvec2(0u);
     bvh_older = uvec2(0u);
@@ -335,26 +335,40 @@ bool bvh_trace(vec3 origin, vec3 dir, float t_min, float t_max, uint from, bool 
     uint longest = subgroupMax(steps);
     bvh_lane_steps += subgroupElect() ? longest * gl_SubgroupSize : 0u;
 #endif
+}
+
+#ifdef WGPU
+// Kernels for wgpu walk the tree alone.
+void planes_read() {}
+bool planes_closest(vec3 origin, vec3 dir, float t_min, float t_max, uint from, inout Hit hit) { return false; }
+bool planes_occluded(vec3 origin, vec3 dir, float t_min, float t_max, uint from, uint to, inout Hit hit) { return false; }
+#else
+#include "traverse_planes.glsl"
+#endif
+
+void trace_start() { planes_read(); }
+
+bool trace_closest(vec3 origin, vec3 dir, float t_min, float t_max, uint from, out Hit hit) {
+    hit = Hit(t_max, vec2(0.0), NONE, NONE, NONE);
+    if (!planes_closest(origin, dir, t_min, t_max, from, hit)) bvh_trace(origin, dir, t_min, t_max, from, false, hit);
+#ifdef TRACE_TWICE
+    // For the limit report. The same hit again, and never nearer, but the compiler does not know.
+    Hit again = Hit(t_max, vec2(0.0), NONE, NONE, NONE);
+    if (!planes_closest(origin, dir, t_min, t_max, from, again)) bvh_trace(origin, dir, t_min, t_max, from, false, again);
+    if (again.t < hit.t) hit = again;
+#endif
     return hit.primitive != NONE;
 }
 
-bool trace_closest(vec3 origin, vec3 dir, float t_min, float t_max, uint from, out Hit hit) {
-    bool is_hit = bvh_trace(origin, dir, t_min, t_max, from, false, hit);
+bool trace_occluded(vec3 origin, vec3 dir, float t_min, float t_max, uint from, uint to) {
+    Hit hit = Hit(t_max, vec2(0.0), NONE, NONE, NONE);
+    if (!planes_occluded(origin, dir, t_min, t_max, from, to, hit)) bvh_trace(origin, dir, t_min, t_max, from, true, hit);
 #ifdef TRACE_TWICE
-    // For the limit report. The same hit again, and never nearer, but the compiler does not know.
-    Hit again;
-    if (bvh_trace(origin, dir, t_min, t_max, from, false, again) && again.t < hit.t) hit = again;
+    Hit again = Hit(t_max, vec2(0.0), NONE, NONE, NONE);
+    if (!planes_occluded(origin, dir, t_min, t_max, from, to, again)) bvh_trace(origin, dir, t_min, t_max, from, true, again);
+    if (again.t < hit.t) hit = again;
 #endif
-    return is_hit;
-}
-
-bool trace_occluded(vec3 origin, vec3 dir, float t_min, float t_max, uint from) {
-    Hit hit;
-    bool is_hit = bvh_trace(origin, dir, t_min, t_max, from, true, hit);
-#ifdef TRACE_TWICE
-    is_hit = bvh_trace(origin, dir, t_min, t_max, from, true, hit) || is_hit;
-#endif
-    return is_hit;
+    return hit.primitive != NONE;
 }
 
 #endif

@@ -71,6 +71,8 @@ shared! {
         light_nodes: u32,
         light_keys: u32,
         light_key_count: u32,
+        planes_center: [f32; 3],
+        planes_extent: [f32; 3],
     }
     Batch {
         first_sample_low: u32,
@@ -98,6 +100,22 @@ shared! {
         object_from_world_z: [f32; 3],
         reserved_1: u32,
         object_from_world_t: [f32; 3],
+        reserved_2: u32,
+    }
+    Plane {
+        normal: [f32; 3],
+        offset: f32,
+        u: [f32; 3],
+        u_offset: f32,
+        v: [f32; 3],
+        v_offset: f32,
+        t_error: f32,
+        edge_error: f32,
+        record: u32,
+        first_triangle: u32,
+        second_triangle: u32,
+        reserved_0: u32,
+        reserved_1: u32,
         reserved_2: u32,
     }
     Material {
@@ -185,6 +203,7 @@ tags! {
     TRIANGLE_HAS_TANGENTS = 0x40000000;
     TRIANGLE_HAS_COLORS = 0x20000000;
     TRIANGLE_IS_MASKED = 0x10000000;
+    PLANES_MAX = 32;
     MATERIAL_DOUBLE_SIDED = 1;
     MATERIAL_MASK = 2;
     MATERIAL_BLEND = 4;
@@ -261,4 +280,5 @@ tags! {
     BIND_MEDIA = 16;
     BIND_PROBE_RAYS = 17;
     BIND_PROBE_HITS = 18;
+    BIND_PLANES = 19;
 }

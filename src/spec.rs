@@ -52,7 +52,25 @@ pub struct Spec {
     pub light_tree: bool,
     /// How direct light is found.
     pub strategy: Strategy,
+    /// Flat pieces that are all tested before the own tree is walked: parallelograms …
+    pub parallelograms: u32,
+    /// … and triangles.
+    pub triangles: u32,
 }
+
+/// Features that plain kernels are compiled without (`PLAIN` in `shaders/spec.glsl`): these are half as
+/// long, and drivers read a kernel at every start.
+#[doc(hidden)]
+pub const NOT_PLAIN: [&str; 8] = [
+    "dielectric",
+    "passage",
+    "nested",
+    "inside",
+    "media",
+    "scattering",
+    "equiangular",
+    "sensor",
+];
 
 impl Spec {
     /// What the scene needs, before geometry is uploaded. `normals`, `attributes`,
@@ -122,12 +140,20 @@ impl Spec {
             strata: self.strata,
             light_tree: self.light_tree,
             strategy: self.strategy,
+            parallelograms: self.parallelograms,
+            triangles: self.triangles,
         }
     }
 
     /// Whether traversals ask of some triangles if they are there: `HAS_CANDIDATES`.
     pub(crate) fn has_candidates(&self) -> bool {
         self.alpha || self.nested
+    }
+
+    /// Whether the plain kernel does.
+    pub(crate) fn is_plain(&self) -> bool {
+        let mut on = self.features().into_iter().filter(|(_, on)| *on);
+        !on.any(|(name, _)| NOT_PLAIN.contains(&name))
     }
 
     /// Names of the features with their state, for people and files.
@@ -165,7 +191,13 @@ impl Spec {
             Strategy::BsdfOnly => 2,
         };
         let flags = self.features().map(|(_, on)| u32::from(on));
-        (0..).zip(flags.into_iter().chain([strategy])).collect()
+        (0..)
+            .zip(
+                flags
+                    .into_iter()
+                    .chain([strategy, self.parallelograms, self.triangles]),
+            )
+            .collect()
     }
 }
 
@@ -242,6 +274,9 @@ pub(crate) mod kernels {
 
     pub(crate) const PATH_SOFTWARE: Kernel = kernel!("path_software");
     pub(crate) const PATH_QUERY: Kernel = kernel!("path_query");
+    /// The same without [`super::NOT_PLAIN`].
+    pub(crate) const PATH_SOFTWARE_PLAIN: Kernel = kernel!("path_software_plain");
+    pub(crate) const PATH_QUERY_PLAIN: Kernel = kernel!("path_query_plain");
     /// As `PATH_SOFTWARE`, but every ray is traced twice: the same image.
     pub(crate) const PATH_TWICE: Kernel = kernel!("path_twice");
     /// As `PATH_SOFTWARE`, and counts what traversal does.
@@ -251,6 +286,7 @@ pub(crate) mod kernels {
     #[cfg(feature = "wgpu")]
     pub(crate) const PATH_WGPU: Kernel = kernel!("path_wgpu");
     pub(crate) const PATH_PIPELINE: Kernel = kernel!("path_pipeline");
+    pub(crate) const PATH_PIPELINE_PLAIN: Kernel = kernel!("path_pipeline_plain");
     pub(crate) const PROBE_PIPELINE: Kernel = kernel!("probe_pipeline");
     /// What the ray generation shaders call.
     pub(crate) const TRACE_MISS: Kernel = kernel!("trace_miss");

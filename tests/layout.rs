@@ -101,7 +101,7 @@ fn specialisation_constants_are_the_same_in_rust_and_glsl() {
         .features()
         .map(|(name, _)| format!("HAS_{}", name.to_uppercase().replace('-', "_")))
         .to_vec();
-    names.push(String::from("STRATEGY"));
+    names.extend(["STRATEGY", "PARALLELOGRAM_COUNT", "TRIANGLE_COUNT"].map(String::from));
     let ids: Vec<u32> = spec.constants().iter().map(|(id, _)| *id).collect();
     let rust: Vec<_> = ids.into_iter().zip(names).collect();
     assert_eq!(probe.spec_ids(), rust, "GLSL, then Rust");
@@ -145,6 +145,19 @@ fn features_switch_the_constant_of_their_name() {
     }
 }
 
+/// What a plain kernel leaves out is what makes a scene take the other one.
+#[test]
+fn plain_kernels_leave_out_solids_media_and_meters() {
+    for kernel in ["path_software", "path_query", "path_pipeline"] {
+        let of = |name: &str| Module::read(name).spec_numbers();
+        let (whole, plain) = (of(kernel), of(&format!("{kernel}_plain")));
+        let features = Spec::default().features();
+        let missing = whole.iter().filter(|id| !plain.contains(id));
+        let missing: Vec<_> = missing.map(|&id| features[id as usize].0).collect();
+        assert_eq!(missing, etendue::spec::NOT_PLAIN, "{kernel}");
+    }
+}
+
 #[test]
 fn strategies_are_the_same_in_rust_and_glsl() {
     let text = shader("spec.glsl");
@@ -159,7 +172,7 @@ fn strategies_are_the_same_in_rust_and_glsl() {
             ..Default::default()
         };
         let spec = Spec::for_scene(&etendue::scene::Scene::default(), &settings);
-        (name, spec.constants().last().unwrap().1)
+        (name, spec.constants()[spec.features().len()].1)
     });
     assert_eq!(constants(&text), rust);
 }

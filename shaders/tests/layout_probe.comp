@@ -19,5 +19,6 @@ layout(binding = 6, scalar) buffer Probe06 { EnvCell env_cells[]; };
 layout(binding = 7, scalar) buffer Probe07 { ProbeRay probe_rays[]; };
 layout(binding = 8, scalar) buffer Probe08 { ProbeHit probe_hits[]; };
 layout(binding = 9, scalar) buffer Probe09 { Medium media[]; };
+layout(binding = 10, scalar) buffer Probe10 { Plane planes[]; };
 
 void main() {}

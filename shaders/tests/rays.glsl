@@ -23,6 +23,6 @@ void rays_trace(uint i) {
     ProbeRay ray = rays[i];
     Hit hit;
     if (!trace_closest(ray.origin, ray.direction, ray.t_min, ray.t_max, ray.from, hit)) hit.t = -1.0;
-    bool occluded = trace_occluded(ray.origin, ray.direction, ray.t_min, ray.t_max, ray.from);
+    bool occluded = trace_occluded(ray.origin, ray.direction, ray.t_min, ray.t_max, ray.from, NONE);
     hits[i] = ProbeHit(hit.t, hit.bary, hit.instance, hit.primitive, hit.record, occluded ? 1u : 0u);
 }

@@ -46,6 +46,7 @@ mod build;
 #[cfg(test)]
 mod flat;
 mod pairs;
+mod patches;
 #[cfg(test)]
 mod tests;
 mod topology;
@@ -55,6 +56,8 @@ mod validate;
 mod watertight;
 
 use glam::Vec3;
+
+pub use patches::Patch;
 
 /// A packed node.
 pub type Node = [u32; 20];

@@ -95,6 +95,9 @@ pub(super) fn is_flat([a, b, c, d]: [Vec3; 4]) -> bool {
     if (0..3).any(|axis| [b, c, d].iter().all(|v| v[axis] == a[axis])) {
         return true;
     }
+    if is_parallelogram([a, b, c, d]) {
+        return true;
+    }
     let edges = [b, c, d].map(|v| v.as_dvec3() - a.as_dvec3());
     // Coordinates that are multiples of one unit, differences below 2¹⁶ units: products of three are below 2⁴⁸, and
     // their sums below 2⁵¹, so nothing is rounded.
@@ -106,6 +109,16 @@ pub(super) fn is_flat([a, b, c, d]: [Vec3; 4]) -> bool {
         .iter()
         .all(|v| (v.as_dvec3() / unit).fract() == DVec3::ZERO);
     is_exact && edges[0].cross(edges[1]).dot(edges[2]) == 0.0
+}
+
+/// Whether opposite edges are equal, in exact arithmetic; `false` where that is not known.
+fn is_parallelogram([a, b, c, d]: [Vec3; 4]) -> bool {
+    (0..3).all(|axis| {
+        let [a, b, c, d] = [a, b, c, d].map(|v| f64::from(v[axis]));
+        // A sum that gives back both its terms was not rounded.
+        let is_exact = |x: f64, y: f64| x + y - x == y && x + y - y == x;
+        is_exact(a, c) && is_exact(b, d) && a + c == b + d
+    })
 }
 
 /// Turns that make the edge from the last corner of `a` to its first the edge from the first corner of `b` to its

@@ -5,6 +5,7 @@ use std::ops::Range;
 use super::{Ledger, Memory, TraversalCounts};
 use crate::error::Result;
 use crate::layout::{self, ProbeHit, ProbeRay};
+use crate::spec::Spec;
 
 /// A scene on a device, ready to render batches.
 pub(super) trait Backend: Send {
@@ -92,7 +93,8 @@ impl Batch {
 /// The window and the buffer that holds its film, or a part of it.
 pub(super) struct Frame<'a> {
     pub params: &'a layout::Params,
-    pub aovs: bool,
+    /// What the kernels are made for.
+    pub spec: &'a Spec,
     pub film_bytes: u64,
 }
 
@@ -104,7 +106,7 @@ impl Frame<'_> {
 
     /// The window in parts whose film fits the buffer.
     pub fn bands(&self) -> Vec<Band> {
-        let rows = ((self.film_bytes / row_bytes(self.params, self.aovs)) as u32).max(1);
+        let rows = ((self.film_bytes / row_bytes(self.params, self.spec.aovs)) as u32).max(1);
         (0..self.params.tiles_y)
             .step_by(rows as usize)
             .map(|row| {

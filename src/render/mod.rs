@@ -12,6 +12,7 @@ mod media;
 mod meter;
 mod pace;
 mod passes;
+mod planes;
 mod report;
 mod room;
 pub mod solids;
@@ -148,12 +149,13 @@ impl Renderer {
         let compile = start.elapsed().as_secs_f64();
         let caps = device.caps();
         tracing::info!(backend = choice.name(), reason, device = caps.name, "ready");
+        let features = features(backend.frame().spec);
         let report = Report {
             backend: choice,
             backend_reason: reason,
             device: caps.name.clone(),
             driver: caps.driver.clone(),
-            features: features(&data.spec),
+            features,
             times: Times {
                 build,
                 compile,
@@ -389,8 +391,10 @@ fn next_batch(current: u32, count: u32, seconds: f64) -> u32 {
 }
 
 fn features(spec: &crate::spec::Spec) -> Vec<Feature> {
+    let planes = ("planes", spec.parallelograms + spec.triangles > 0);
     spec.features()
         .into_iter()
+        .chain([planes])
         .map(|(name, on)| Feature { name, on })
         .collect()
 }
@@ -428,15 +432,19 @@ pub fn devices() -> Result<Vec<DeviceInfo>> {
 /// # Errors
 /// Geometry that no tree can hold.
 pub fn model(scene: &Scene, settings: &Settings) -> Result<SceneModel> {
-    let data = SceneData::new(scene, settings, geometry::DEFAULT_COPY_LIMIT);
+    let mut data = SceneData::new(scene, settings, geometry::DEFAULT_COPY_LIMIT);
     let bvh = traversal::build_bvh(&data)?;
+    let mut spec = data.spec;
+    if let Some(planes) = planes::Planes::of(&bvh, &data) {
+        planes.note(&mut spec, &mut data.params);
+    }
     let triangles = data.geometry.triangles.len() as u64;
     let window = settings.window();
     let pixels = u64::from(window.x1 - window.x0) * u64::from(window.y1 - window.y0);
     let floats = backend::film_floats(settings.aovs);
     let memory = room::estimate(&data, Some(&bvh), pixels * 4 * u64::from(floats));
     Ok(SceneModel {
-        features: features(&data.spec),
+        features: features(&spec),
         triangles,
         bytes_per_triangle: (memory.geometry + memory.acceleration) as f64
             / triangles.max(1) as f64,

@@ -12,7 +12,7 @@ use crate::bvh::{Bvh, GroupDesc, InstanceDesc, Quality};
 use crate::error::Result;
 use crate::gpu::{
     BindSet, BindingKind, Blas, BlasGeometry, Buffer, Commands, Device, Pipeline, PipelineDesc,
-    RayStages, Resource, Tlas, TlasInstance,
+    RayStages, Resource, Tlas, TlasInstance, Usage,
 };
 use crate::layout;
 use crate::settings::BackendChoice;
@@ -110,9 +110,19 @@ fn world_from_object(record: &layout::Instance) -> [[f32; 3]; 4] {
 
 /// What answers "what does this ray meet?".
 pub(super) enum Traversal {
-    Software { nodes: Buffer, records: Buffer },
-    Query { scene: Tlas, bytes: u64 },
-    Pipeline { scene: Tlas, bytes: u64 },
+    Software {
+        nodes: Buffer,
+        records: Buffer,
+        planes: Buffer,
+    },
+    Query {
+        scene: Tlas,
+        bytes: u64,
+    },
+    Pipeline {
+        scene: Tlas,
+        bytes: u64,
+    },
 }
 
 impl Traversal {
@@ -122,6 +132,7 @@ impl Traversal {
             Self::Software { .. } => vec![
                 (layout::BIND_BVH_NODES, BindingKind::Texel),
                 (layout::BIND_BVH_TRIANGLES, BindingKind::Texel),
+                (layout::BIND_PLANES, BindingKind::Uniform),
             ],
             Self::Query { .. } | Self::Pipeline { .. } => {
                 vec![(layout::BIND_SCENE, BindingKind::AccelerationStructure)]
@@ -132,9 +143,14 @@ impl Traversal {
     /// What is put there.
     pub fn resources(&self) -> Vec<(u32, Resource<'_>)> {
         match self {
-            Self::Software { nodes, records } => vec![
+            Self::Software {
+                nodes,
+                records,
+                planes,
+            } => vec![
                 (layout::BIND_BVH_NODES, Resource::Buffer(nodes)),
                 (layout::BIND_BVH_TRIANGLES, Resource::Buffer(records)),
+                (layout::BIND_PLANES, Resource::Buffer(planes)),
             ],
             Self::Query { scene, .. } | Self::Pipeline { scene, .. } => {
                 vec![(layout::BIND_SCENE, Resource::Acceleration(scene))]
@@ -150,13 +166,17 @@ impl Traversal {
         bindings: &[(u32, BindingKind)],
         study: Study,
     ) -> Result<Pipeline> {
+        let is_plain = spec.is_plain();
         let kernel = match self {
             Self::Software { .. } => match study {
+                Study::None if is_plain => kernels::PATH_SOFTWARE_PLAIN,
                 Study::None => kernels::PATH_SOFTWARE,
                 Study::Twice => kernels::PATH_TWICE,
                 Study::Counts => kernels::PATH_COUNTS,
             },
+            Self::Query { .. } if is_plain => kernels::PATH_QUERY_PLAIN,
             Self::Query { .. } => kernels::PATH_QUERY,
+            Self::Pipeline { .. } if is_plain => kernels::PATH_PIPELINE_PLAIN,
             Self::Pipeline { .. } => kernels::PATH_PIPELINE,
         };
         self.pipeline(device, "path", kernel, spec, bindings)
@@ -231,17 +251,28 @@ impl Traversal {
     /// Bytes of trees or acceleration structures on the device.
     pub fn bytes(&self) -> u64 {
         match self {
-            Self::Software { nodes, records } => nodes.bytes() + records.bytes(),
+            Self::Software {
+                nodes,
+                records,
+                planes,
+            } => nodes.bytes() + records.bytes() + planes.bytes(),
             Self::Query { bytes, .. } | Self::Pipeline { bytes, .. } => *bytes,
         }
     }
 }
 
-/// The tree on the device.
-pub(super) fn upload_bvh(device: &Arc<Device>, bvh: &Bvh) -> Result<Traversal> {
+/// The tree on the device, and what is tested before it.
+pub(super) fn upload_bvh(
+    device: &Arc<Device>,
+    bvh: &Bvh,
+    planes: &[layout::Plane],
+) -> Result<Traversal> {
+    let mut all = [layout::Plane::default(); layout::PLANES_MAX as usize];
+    all[..planes.len()].copy_from_slice(planes);
     Ok(Traversal::Software {
         nodes: texel(device, "bvh nodes", RECORDS, &bvh.nodes, false)?,
         records: texel(device, "bvh triangles", RECORDS, &bvh.triangles, false)?,
+        planes: Buffer::from_slice(device, "planes", Usage::UNIFORM, &all)?,
     })
 }
 

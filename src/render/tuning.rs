@@ -16,6 +16,8 @@ pub struct Tuning {
     pub everything: bool,
     /// Stands for the bytes that are free on the device.
     pub device_bytes: Option<u64>,
+    /// Whether few flat pieces are tested without a walk of our own tree; `None`: on CPUs, where it is faster.
+    pub planes: Option<bool>,
     /// Renders by a kernel that is slower and tells more.
     pub study: Study,
 }
@@ -56,6 +58,7 @@ impl Default for Tuning {
             copy_limit: geometry::DEFAULT_COPY_LIMIT,
             everything: false,
             device_bytes: None,
+            planes: None,
             study: Study::None,
         }
     }

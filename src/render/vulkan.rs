@@ -4,6 +4,7 @@
 use std::sync::Arc;
 
 use super::backend::{Backend, Batch, Frame, film_bytes, film_floats, read_ledger, workers};
+use super::planes::Planes;
 use super::room;
 use super::traversal::{GROUP, Traversal, build_scene, note_roots, own_tree, upload_bvh};
 use super::upload::SceneData;
@@ -81,7 +82,9 @@ impl VulkanBackend {
         data: &SceneData,
         tuning: &Tuning,
     ) -> Result<Self> {
+        let is_cpu = device.caps().kind == DeviceKind::Cpu;
         let mut params = data.params;
+        let mut spec = data.spec;
         let bvh = own_tree(choice, data)?;
         let film_bytes = film_bytes(device.caps().max_storage_range, &params, data.spec.aovs);
         let mut memory = room::estimate(data, bvh.as_ref(), film_bytes);
@@ -97,7 +100,18 @@ impl VulkanBackend {
         let traversal = match bvh {
             Some(bvh) => {
                 note_roots(&bvh, data, &mut params, &mut instances);
-                upload_bvh(device, &bvh)?
+                let planes = match tuning.planes.unwrap_or(is_cpu) {
+                    true => Planes::of(&bvh, data),
+                    false => None,
+                };
+                if let Some(planes) = &planes {
+                    planes.note(&mut spec, &mut params);
+                }
+                upload_bvh(
+                    device,
+                    &bvh,
+                    planes.as_ref().map_or(&[], |planes| &planes.list),
+                )?
             }
             None => {
                 let (scene, bytes) = build_scene(device, data, &vertices)?;
@@ -202,7 +216,7 @@ impl VulkanBackend {
         let mut bindings: Vec<_> = shared.iter().map(|(at, kind, _)| (*at, *kind)).collect();
         bindings.extend([(layout::BIND_FILM, storage), (layout::BIND_LEDGER, storage)]);
         bindings.extend(traversal.bindings());
-        let pipeline = traversal.path_pipeline(device, &data.spec, &bindings, tuning.study)?;
+        let pipeline = traversal.path_pipeline(device, &spec, &bindings, tuning.study)?;
         let mut resources: Vec<_> = shared
             .iter()
             .map(|(at, _, buffer)| (*at, Resource::Buffer(buffer)))
@@ -218,13 +232,13 @@ impl VulkanBackend {
             device: Arc::clone(device),
             traversal,
             params,
-            spec: data.spec,
+            spec,
             shared,
             film,
             ledger,
             pipeline,
             set,
-            workers: workers(device.caps().kind == DeviceKind::Cpu),
+            workers: workers(is_cpu),
             memory,
         })
     }
@@ -255,7 +269,7 @@ impl Backend for VulkanBackend {
     fn frame(&self) -> Frame<'_> {
         Frame {
             params: &self.params,
-            aovs: self.spec.aovs,
+            spec: &self.spec,
             film_bytes: self.film.bytes(),
         }
     }

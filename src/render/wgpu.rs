@@ -9,7 +9,7 @@ use crate::error::{Error, Result};
 use crate::gpu::{Caps, DeviceKind};
 use crate::layout::{self, ProbeHit, ProbeRay};
 use crate::settings::BackendChoice;
-use crate::spec::kernels;
+use crate::spec::{Spec, kernels};
 use crate::wgpu::{Buffer, Device, Kernel, KernelDesc, Kind};
 
 /// A scene on a device of wgpu's.
@@ -21,7 +21,7 @@ pub(super) struct WgpuBackend {
     film: Buffer,
     film_bytes: u64,
     ledger: Buffer,
-    aovs: bool,
+    spec: Spec,
     workers: u32,
     memory: Memory,
 }
@@ -89,7 +89,7 @@ impl WgpuBackend {
             film,
             film_bytes,
             ledger,
-            aovs: data.spec.aovs,
+            spec: data.spec,
             workers: workers(caps.kind == DeviceKind::Cpu),
             memory,
         })
@@ -112,7 +112,7 @@ impl Backend for WgpuBackend {
     fn frame(&self) -> Frame<'_> {
         Frame {
             params: &self.params,
-            aovs: self.aovs,
+            spec: &self.spec,
             film_bytes: self.film_bytes,
         }
     }
@@ -124,7 +124,7 @@ impl Backend for WgpuBackend {
 
     fn read(&self, pixels: usize, values: &mut Vec<f32>) -> Result<()> {
         let start = values.len();
-        values.resize(start + pixels * film_floats(self.aovs) as usize, 0.0);
+        values.resize(start + pixels * film_floats(self.spec.aovs) as usize, 0.0);
         let content = bytemuck::cast_slice_mut(&mut values[start..]);
         self.device.read(&self.film, content)
     }

@@ -118,6 +118,13 @@ impl Module {
         ids
     }
 
+    /// The ids alone, also of modules without names.
+    pub fn spec_numbers(&self) -> Vec<u32> {
+        let mut ids: Vec<_> = self.decorations(SPEC_ID).map(|(_, id)| id).collect();
+        ids.sort_unstable();
+        ids
+    }
+
     /// Bindings whose variables are read or written, sorted.
     pub fn bindings_in_use(&self) -> Vec<u32> {
         let touched: Vec<u32> = [OP_LOAD, OP_ACCESS_CHAIN]

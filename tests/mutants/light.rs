@@ -212,6 +212,16 @@ pub const MUTANTS: &[Mutant] = &[
         killers: &["integrator::analytic::far_lamps_are_not_in_their_own_shadow"],
     },
     Mutant {
+        name: "planes-edge",
+        wrong: "flat pieces of small scenes are surely met beside their edges, too",
+        file: "shaders/traverse_planes.glsl",
+        edits: &[(
+            "!is_left && inside > edge &&",
+            "!is_left && inside > -edge &&",
+        )],
+        killers: &["traversal::planes::few_flat_pieces_are_met_as_in_the_tree"],
+    },
+    Mutant {
         name: "offset-small",
         wrong: "the bound on a hit point's error is 160 times too small",
         file: "shaders/surface.glsl",

@@ -21,6 +21,7 @@ mod brute;
 mod furnace;
 mod gap;
 mod pictures;
+mod planes;
 mod scenes;
 mod soup;
 mod table;
@@ -47,17 +48,24 @@ static WORKSHOP: Workshop = Workshop::new();
 
 /// A renderer under validation, or the printed reason why there is none.
 fn open(scene: &Scene, settings: &Settings, levels: Levels) -> Option<Renderer> {
-    let options = DeviceOptions {
-        device: None,
-        validation: true,
-    };
     let copy_limit = match levels {
         Levels::Flat => usize::MAX,
         Levels::Two => 0,
     };
     let tuning = Tuning {
         copy_limit,
+        // The tree is what these tests are about; `planes` shows that small scenes are met alike without it.
+        planes: Some(false),
         ..Tuning::default()
+    };
+    open_tuned(scene, settings, tuning)
+}
+
+/// The same with other details.
+fn open_tuned(scene: &Scene, settings: &Settings, tuning: Tuning) -> Option<Renderer> {
+    let options = DeviceOptions {
+        device: None,
+        validation: true,
     };
     match Renderer::made_in(&WORKSHOP, scene, settings, &options, tuning) {
         Ok(renderer) => {
