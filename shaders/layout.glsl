@@ -27,7 +27,9 @@ struct Params {
     uint window_x;           // first column rendered
     vec3 env_radiance;       // factor on the map, or the constant radiance
     float env_choice;        // probability that direct light samples the map
+    vec3 planes_center;      // where coordinates of Plane start
     uint window_y;           // first row rendered
+    vec3 planes_extent;      // distance from there, along each axis, at which rays that are tested may start
     uint window_width;       // columns rendered
     uint window_height;      // rows rendered
     uint tiles_x;            // tiles of 8 × 8 pixels across the window
@@ -48,9 +50,6 @@ struct Params {
     uint light_nodes;        // texels in `lights`: of the root …
     uint light_keys;         // … and of the first key
     uint light_key_count;    // emissive triangles
-    // With flat pieces (PARALLELOGRAM_COUNT, TRIANGLE_COUNT):
-    vec3 planes_center;      // where their coordinates start
-    vec3 planes_extent;      // distance from there, along each axis, at which rays may start
 };
 
 // --- Push constants: one per batch -----------------------------------------

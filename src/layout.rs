@@ -51,7 +51,9 @@ shared! {
         window_x: u32,
         env_radiance: [f32; 3],
         env_choice: f32,
+        planes_center: [f32; 3],
         window_y: u32,
+        planes_extent: [f32; 3],
         window_width: u32,
         window_height: u32,
         tiles_x: u32,
@@ -71,8 +73,6 @@ shared! {
         light_nodes: u32,
         light_keys: u32,
         light_key_count: u32,
-        planes_center: [f32; 3],
-        planes_extent: [f32; 3],
     }
     Batch {
         first_sample_low: u32,

@@ -10,6 +10,7 @@ use glam::{DVec3, Vec3};
 
 use crate::common::backends::pair;
 use crate::common::*;
+use crate::tier::{bound, count};
 use crate::{block, channel_mean, fresnel, glass, grey, sheet};
 
 /// A mesh of `material` in a white world, seen whole.
@@ -82,7 +83,12 @@ fn white_media_are_invisible_in_a_white_world() {
             };
             let scene = in_white(block(-half, half), glass(ior, medium));
             let what = format!("τ {tau}, {phase:?}, n {ior}");
-            assert_white(&what, &scene, &settings(24, 128), 1e-2);
+            assert_white(
+                &what,
+                &scene,
+                &settings(24, count(128, 16_384)),
+                bound(1e-2, 1e-3),
+            );
         }
     }
 }
