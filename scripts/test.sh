@@ -37,7 +37,8 @@ skip() {
 # The SPIR-V of the newest build of this crate.
 validate_shaders() {
     local newest file count=0
-    newest="$(ls -td "$CARGO_TARGET_DIR"/release/build/etendue-*/out | head -n 1)"
+    # a folder that is written again keeps its time
+    newest="$(dirname "$(ls -t "$CARGO_TARGET_DIR"/release/build/etendue-*/out/path_software.spv | head -n 1)")"
     for file in "$newest"/*.spv; do
         # devices of wgpu have no scalar layout
         case "$file" in
