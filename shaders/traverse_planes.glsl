@@ -69,6 +69,10 @@ PlaneSearch planes_search(vec3 origin, vec3 dir, float t_min, float t_max, uint 
     PlaneSearch s = PlaneSearch(start, dir, t_min, from, to, NONE, t_max, t_max, is_near);
     [[unroll]] for (uint i = 0u; i < PARALLELOGRAM_COUNT; i++) planes_test(s, planes[i], false);
     [[unroll]] for (uint i = 0u; i < TRIANGLE_COUNT; i++) planes_test(s, planes[PARALLELOGRAM_COUNT + i], true);
+#ifdef TRACE_COUNTS
+    bvh_steps++;
+    bvh_lane_steps += subgroupElect() ? gl_SubgroupSize : 0u;
+#endif
     return s;
 }
 
@@ -78,6 +82,9 @@ bool planes_closest(vec3 origin, vec3 dir, float t_min, float t_max, uint from, 
     PlaneSearch s = planes_search(origin, dir, t_min, t_max, from, NONE);
     if (!s.is_sure || s.record == NONE) return s.is_sure;
     uint record = 4u * s.record;
+#ifdef TRACE_COUNTS
+    bvh_records_read++;
+#endif
     return bvh_intersect(bvh_ray(origin, dir), record, bvh_triangle_texel(record), 0u, t_min, hit);
 }
 

@@ -69,7 +69,9 @@ fn a_tiny_bench_is_measured_and_drawn() {
     assert_eq!(limits.len(), 3);
     for limit in limits {
         let number = |name: &str| limit[name].as_f64().unwrap();
-        assert!(number("nodes_per_ray") >= 1.0, "{limit}");
+        // a scene of few flat pieces visits no node, and reads the record that is met
+        let read = number("nodes_per_ray") + number("records_per_ray");
+        assert!(read > 0.1, "{limit}");
         assert!((0.0..=1.0).contains(&number("lane_use")), "{limit}");
         assert!(number("lane_use") > 0.1, "{limit}");
         assert!(number("bandwidth") > 1e8, "{limit}");
