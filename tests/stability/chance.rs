@@ -144,3 +144,46 @@ fn sample_numbers_pass_two_to_the_32() {
         is_likely(&format!("range {i} against the first"), z);
     }
 }
+
+/// Form factor of a rectangle for a point on the normal through one of its corners, `a` × `b` at distance `h`.
+fn corner_factor(a: f64, b: f64, h: f64) -> f64 {
+    let part = |x: f64, y: f64| {
+        let root = x.hypot(h);
+        x / root * (y / root).atan()
+    };
+    (part(a, b) + part(b, a)) / (2.0 * std::f64::consts::PI)
+}
+
+/// Nets of 16 bring no plateau: squared error × samples is the same for 16 and for 1024, and for 1000, which is no
+/// number of whole nets; all of it about the closed form.
+#[test]
+fn errors_of_nets_fall_as_of_independent_samples() {
+    const SIDE: u32 = 64;
+    let truth = 0.7 * 4.0 * corner_factor(4.0, 4.0, 3.0);
+    let scene = noisy_plane();
+    let mut first = None;
+    for samples in [16, 64, 256, 1000, 1024] {
+        let (mut sum, mut squares, mut count) = (0.0, 0.0, 0.0);
+        for seed in 1..=4 {
+            let Some(film) = picture(&scene, SIDE, 0..samples, seed) else {
+                return;
+            };
+            assert!(film.block_level() > 0);
+            for mean in film.mean() {
+                let off = f64::from(mean[0]) - truth;
+                sum += off;
+                squares += off * off;
+                count += 1.0;
+            }
+        }
+        let product = squares / count * samples as f64;
+        let ratio = product / *first.get_or_insert(product);
+        let bias = sum / count / (squares / count / count).sqrt();
+        println!(
+            "{samples} samples: squared error × samples {product:.4}, {ratio:.3} of the first"
+        );
+        is_likely(&format!("mean of {samples} samples"), bias);
+        // 16384 pixels tell it to 1.1 % each
+        assert!((ratio - 1.0).abs() < 0.08, "{samples} samples: {ratio}");
+    }
+}
