@@ -303,20 +303,19 @@ fn choose(
         })
 }
 
-/// The device of this index, else the first one whose name contains the text.
+/// The device of this index; of a text that is no number, the first one whose name contains it.
 fn find(
     mut devices: Vec<(vk::PhysicalDevice, Caps)>,
     select: &str,
 ) -> Option<(vk::PhysicalDevice, Caps)> {
     let lower = select.to_lowercase();
-    let position = devices
-        .iter()
-        .position(|(_, caps)| select.parse() == Ok(caps.index))
-        .or_else(|| {
-            devices
-                .iter()
-                .position(|(_, caps)| caps.name.to_lowercase().contains(&lower))
-        })?;
+    let index: Option<usize> = select.parse().ok();
+    let is_meant = |caps: &Caps| match index {
+        // the names of drivers have numbers in them, too
+        Some(index) => caps.index == index,
+        None => caps.name.to_lowercase().contains(&lower),
+    };
+    let position = devices.iter().position(|(_, caps)| is_meant(caps))?;
     Some(devices.swap_remove(position))
 }
 
