@@ -14,7 +14,7 @@ export ETENDUE_REQUIRE_DEVICE=1 RUST_TEST_THREADS=1
 # Compiling a kernel takes one core, rendering all of them: two processes keep two cores busy.
 readonly AT_ONCE=2
 # Those that take longest, first, so that none of them is left at the end.
-readonly LONGEST=(reference faults stability integrator matter work cli compare shading traversal fuzz measure)
+readonly LONGEST=(reference matter integrator traversal stability compare work faults layout cli shading measure fuzz)
 readonly WGPU_RUST_VERSION=1.87
 
 summary=()

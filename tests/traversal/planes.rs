@@ -9,7 +9,7 @@ use glam::{DAffine3, DQuat, DVec3, Vec3};
 use crate::scenes::{Random, cube, lambert, mesh, scaled, scene};
 use crate::{finish, open_tuned};
 
-const RAYS: usize = 60_000;
+const RAYS: usize = 40_000;
 /// Half widths of the rooms, metres: powers of two, which round nothing.
 const SIZES: [f64; 5] = [1.0, 1.0, 1.0 / 1_048_576.0, 1_048_576.0, 8.0];
 
