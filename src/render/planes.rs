@@ -65,8 +65,9 @@ impl Planes {
 /// within it, and c the cosine between ray and normal:
 /// - the numerator of t is off by 5 W·R, its denominator by 4, the quotient by 1: t by (5 W·R + 6 D) / c;
 /// - the point by that along the ray and by 2 (R + D) of its own, a coordinate by |U| times both and 5 (U·R + U₀);
-/// - vertices in the tree's test are off by 5 D across the ray, products of two by 30 D × diameter, twice the area is
-///   what they are divided by: coordinates by 15 D × diameter / (area c), t by this times the diameter.
+/// - vertices in the tree's test are off by 5 D across the ray, products of two by 30 D × diameter, and they are divided
+///   by c times twice the triangle's area: weights by that, coordinates from -1 to 1 by twice as much, t by two
+///   weights' times the diameter, as long as √3 of it in the tree's units.
 fn plane(patch: &Patch, center: DVec3, extent: DVec3) -> Option<Plane> {
     let corners = patch.corners.map(|corner| corner - center);
     let [a, b, c, d] = corners;
@@ -89,9 +90,10 @@ fn plane(patch: &Patch, center: DVec3, extent: DVec3) -> Option<Plane> {
     let bend = (a + c - b - d).length();
     let bend = if patch.is_parallelogram { bend } else { 0.0 };
     let own = UNIT * (6.0 * reach(normal, offsets[0]) + 7.0 * way);
-    let tree = UNIT * 16.0 * way * diameter / doubled;
-    let t_error = own + tree * diameter + bend;
-    let edge_error = gradient * (own + UNIT * 4.0 * way + bend) + UNIT * 6.0 * coordinates + tree;
+    let weight = UNIT * 30.0 * way * diameter / doubled;
+    let t_error = own + UNIT * 6.0 * way + 4.0 * weight * diameter + bend;
+    let edge_error =
+        gradient * (own + UNIT * 4.0 * way + bend) + UNIT * 6.0 * coordinates + scale * weight;
     let is_good = t_error.is_finite() && edge_error < MAX_ERROR;
     let single = |w: DVec3| w.as_vec3().to_array();
     is_good.then(|| Plane {
