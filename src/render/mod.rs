@@ -434,9 +434,8 @@ pub fn devices() -> Result<Vec<DeviceInfo>> {
 pub fn model(scene: &Scene, settings: &Settings) -> Result<SceneModel> {
     let mut data = SceneData::new(scene, settings, geometry::DEFAULT_COPY_LIMIT);
     let bvh = traversal::build_bvh(&data)?;
-    let mut spec = data.spec;
     if let Some(planes) = planes::Planes::of(&bvh, &data) {
-        planes.note(&mut spec, &mut data.params);
+        planes.note(&mut data.spec, &mut data.params);
     }
     let triangles = data.geometry.triangles.len() as u64;
     let window = settings.window();
@@ -444,7 +443,7 @@ pub fn model(scene: &Scene, settings: &Settings) -> Result<SceneModel> {
     let floats = backend::film_floats(settings.aovs);
     let memory = room::estimate(&data, Some(&bvh), pixels * 4 * u64::from(floats));
     Ok(SceneModel {
-        features: features(&spec),
+        features: features(&data.spec),
         triangles,
         bytes_per_triangle: (memory.geometry + memory.acceleration) as f64
             / triangles.max(1) as f64,
