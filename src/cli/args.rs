@@ -222,7 +222,8 @@ pub struct RenderArgs {
     #[arg(long, value_name = "X", default_value_t = 1e-6, allow_negative_numbers = true, value_parser = not_negative)]
     pub max_dropped: f64,
 
-    /// Extra layers of the EXR, separated by commas; `dropped` counts samples that were not finite
+    /// Extra layers of the EXR, separated by commas; `dropped` counts samples that were not finite,
+    /// `instance` and `material` number what covers the middle of a pixel (-1: nothing)
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = aov())]
     pub aov: Vec<String>,
     /// Tone curve of display formats; EXR is always linear. none: linear values

@@ -147,6 +147,7 @@ impl<'a> Keeper<'a> {
             job: self.job,
             report: &self.report,
             film: progress.film,
+            layers: &[],
             stop: Stop::Interrupt,
         };
         let result = save(self.path, &record);

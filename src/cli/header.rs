@@ -5,7 +5,7 @@ use std::ops::Range;
 use std::path::Path;
 
 use etendue::film::Film;
-use etendue::image_io::{Metadata, Value};
+use etendue::image_io::{Aov, Metadata, Value};
 use etendue::render::Report;
 use etendue::scene::Scene;
 use etendue::settings::Settings;
@@ -53,6 +53,8 @@ pub struct Record<'a> {
     pub report: &'a Report,
     /// The result.
     pub film: &'a Film,
+    /// The layers that are not in the film.
+    pub layers: &'a [(Aov, Vec<f32>)],
     /// Why it ended.
     pub stop: Stop,
 }

@@ -28,6 +28,8 @@ struct Shard {
     asked: Vec<Range<u64>>,
     /// Pixels times samples.
     paths: f64,
+    /// Layers that the film does not know.
+    layers: Vec<(Aov, Vec<f32>)>,
 }
 
 /// Merges and writes.
@@ -52,6 +54,9 @@ pub fn run(args: &MergeArgs) -> Result<Outcome, Failure> {
     let is_asked = |aov: &Aov| layers.split(',').any(|name| name == aov.name());
     let layers: Vec<_> = Aov::ALL.into_iter().filter(is_asked).collect();
     let mut image = Image::from_film(&film, &layers, header)?;
+    for (aov, values) in std::mem::take(&mut shards[0].layers) {
+        image.push_layer(aov, values);
+    }
     image.push_nodes(&film);
     write_exr(&args.output, &image)?;
     tracing::info!("wrote {}", args.output.display());
@@ -81,6 +86,17 @@ fn gather(paths: &[PathBuf]) -> Result<(Film, Vec<Shard>)> {
                 });
             }
         }
+        if let Some((aov, _)) = first
+            .layers
+            .iter()
+            .find(|layer| !shard.layers.contains(layer))
+        {
+            return Err(Error::Mismatch {
+                path: path.clone(),
+                field: aov.name(),
+                what: format!("the layer differs from the one {whose}"),
+            });
+        }
         film.merge(more)?;
         shards.push(shard);
     }
@@ -96,6 +112,9 @@ fn read(path: &Path) -> Result<(Film, Shard)> {
     let held = samples(path, &image.metadata, "samples")?;
     let asked = samples(path, &image.metadata, "settings.samples")?;
     let film = image.film().map_err(fail)?;
+    let numbers = Aov::ALL.into_iter().filter(|aov| aov.is_identity());
+    let layer = |aov: Aov| Some((aov, image.channel(aov.name())?.to_vec()));
+    let layers = numbers.filter_map(layer).collect();
     if film.ranges() != held {
         let is = ranges(&film.ranges());
         let should = ranges(&held);
@@ -108,6 +127,7 @@ fn read(path: &Path) -> Result<(Film, Shard)> {
         held,
         asked,
         paths: film.samples() as f64 * film.pixels() as f64,
+        layers,
         header: image.metadata,
     };
     Ok((film, shard))

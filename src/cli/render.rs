@@ -6,9 +6,9 @@ use std::time::Instant;
 
 use etendue::film::Film;
 use etendue::image_io::{
-    Format, Image, Lock, lock, probe_writable, write_bytes, write_exr, write_png,
+    Aov, Format, Image, Lock, lock, probe_writable, write_bytes, write_exr, write_png,
 };
-use etendue::render::{Control, Progress, Report, Team, Work};
+use etendue::render::{Control, Identities, Progress, Report, Team, Work};
 use etendue::scene::{Environment, Scene, gltf, load_environment};
 use etendue::settings::Settings;
 use etendue::{Error, Result};
@@ -52,6 +52,7 @@ pub fn repeat(args: &RenderArgs, repeats: Option<&Repeat>) -> Result<Outcome, Fa
     }
     let mut renderer = Team::new(&job.scene, &job.settings, &devices)?;
     introduce(&reporter, &job, &renderer);
+    let layers = identities(&renderer, args)?;
     let (film, work) = begin(&job, saved, &renderer.report(), &reporter)?;
 
     interrupt.begin_rendering();
@@ -65,6 +66,7 @@ pub fn repeat(args: &RenderArgs, repeats: Option<&Repeat>) -> Result<Outcome, Fa
         job: &job,
         report: &report,
         film: &film,
+        layers: &layers,
         stop,
     };
     // first, so that nothing is lost where the images cannot be written
@@ -110,6 +112,25 @@ fn prepare<'a>(
     Ok(job)
 }
 
+/// The layers of numbers that are asked for.
+fn identities(renderer: &Team, args: &RenderArgs) -> Result<Vec<(Aov, Vec<f32>)>> {
+    let asked: Vec<_> = args
+        .aovs()
+        .into_iter()
+        .filter(|a| a.is_identity())
+        .collect();
+    if asked.is_empty() {
+        return Ok(Vec::new());
+    }
+    let Identities {
+        instances,
+        materials,
+    } = renderer.identities()?;
+    let mut layers = vec![(Aov::Instance, instances), (Aov::Material, materials)];
+    layers.retain(|(aov, _)| asked.contains(aov));
+    Ok(layers)
+}
+
 /// The film to begin with, and what it took.
 fn begin(
     job: &Job,
@@ -122,6 +143,7 @@ fn begin(
         job,
         report,
         film: &empty,
+        layers: &[],
         stop: Stop::Samples,
     };
     if let Some(repeat) = job.repeats {
@@ -347,6 +369,7 @@ fn rescue(error: Error, renderer: &mut Team, job: &Job, reporter: &Reporter) -> 
         job,
         report: &report,
         film: &film,
+        layers: &[],
         stop: Stop::Interrupt,
     };
     match checkpoint::save(path, &record) {
@@ -427,6 +450,9 @@ fn finish(record: &Record, cost: Cost, reporter: &Reporter, start: Instant) -> R
     let writing = Instant::now();
     let args = record.job.args;
     let mut image = Image::from_film(record.film, &args.aovs(), record.metadata())?;
+    for (aov, values) in record.layers {
+        image.push_layer(*aov, values.clone());
+    }
     if args.samples.is_some() {
         image.push_nodes(record.film);
     }

@@ -91,11 +91,15 @@ pub enum Aov {
     Samples,
     /// `dropped`: how many of them were not finite and count as black.
     Dropped,
+    /// `instance`: number of the placed primitive that covers the middle of the pixel; −1 where nothing does.
+    Instance,
+    /// `material`: number of its material in the file; −1 where nothing is.
+    Material,
 }
 
 impl Aov {
     /// Every AOV.
-    pub const ALL: [Self; 7] = [
+    pub const ALL: [Self; 9] = [
         Self::Albedo,
         Self::Normal,
         Self::Depth,
@@ -103,6 +107,8 @@ impl Aov {
         Self::StandardError,
         Self::Samples,
         Self::Dropped,
+        Self::Instance,
+        Self::Material,
     ];
 
     /// The name on the command line and of the layer.
@@ -115,17 +121,24 @@ impl Aov {
             Self::StandardError => "stderr",
             Self::Samples => "samples",
             Self::Dropped => "dropped",
+            Self::Instance => "instance",
+            Self::Material => "material",
         }
     }
 
     /// Whether the film must hold the sums that only AOVs need ([`crate::settings::Settings::aovs`]): of the first hit, and of dropped samples.
     pub fn needs_first_hit(self) -> bool {
-        !matches!(self, Self::StandardError | Self::Samples)
+        !matches!(self, Self::StandardError | Self::Samples) && !self.is_identity()
+    }
+
+    /// Whether the film knows nothing of it: a number, which no mean can give ([`Image::push_layer`]).
+    pub fn is_identity(self) -> bool {
+        matches!(self, Self::Instance | Self::Material)
     }
 }
 
 impl Image {
-    /// The mean of a film and the layers asked for; [`Self::BLOCK`] is added to the header.
+    /// The mean of a film and the layers asked for that it has; [`Self::BLOCK`] is added to the header.
     ///
     /// # Errors
     /// [`Error::Settings`] when a layer needs sums of the first hit that the film does not have.
@@ -138,7 +151,7 @@ impl Image {
             ["R", "G", "B"].map(String::from),
             film.mean(),
         );
-        for &aov in aovs {
+        for &aov in aovs.iter().filter(|aov| !aov.is_identity()) {
             push_aov(&mut channels, film, aov).ok_or_else(|| Error::Settings {
                 name: "--aov",
                 what: format!("{} was not rendered", aov.name()),
@@ -150,6 +163,12 @@ impl Image {
             channels,
             metadata,
         })
+    }
+
+    /// Adds a layer of one value for each pixel that the film does not know.
+    pub fn push_layer(&mut self, aov: Aov, values: Vec<f32>) {
+        let name = aov.name().to_owned();
+        self.channels.push(Channel { name, values });
     }
 
     /// Columns and rows of the window.
@@ -214,6 +233,7 @@ fn push_aov(channels: &mut Vec<Channel>, film: &Film, aov: Aov) -> Option<()> {
         Aov::Albedo => push_vectors(channels, names(rgb), film.albedo()?),
         Aov::Normal => push_vectors(channels, names(xyz), film.normal()?),
         Aov::StandardError => push_vectors(channels, names(rgb), film.standard_error()),
+        Aov::Instance | Aov::Material => return None,
     }
     Some(())
 }

@@ -6,6 +6,7 @@ use std::path::PathBuf;
 
 use glam::{DAffine3, DMat3, DVec3, Vec3};
 
+use super::identity::Owner;
 use super::solids::Solids;
 use crate::bvh::MAX_COORDINATE;
 use crate::error::{Error, Result};
@@ -53,6 +54,8 @@ pub struct Geometry {
     pub groups: Vec<Group>,
     /// Placement 0 is group 0.
     pub placements: Vec<Placement>,
+    /// Which placed primitive each triangle comes from, sorted.
+    pub owners: Vec<Owner>,
     /// Radius of a sphere about the middle of the scene that holds it, metres.
     pub radius: f64,
     /// Any triangle has shading normals of its own.
@@ -97,8 +100,14 @@ impl Geometry {
             .sum();
         let is_shared = |mesh: u32| uses[mesh as usize] > 1 && copied > copy_limit;
 
-        let records = || scene.instances.iter().zip(&solids.records);
-        for (instance, record) in records().filter(|(i, _)| !is_shared(i.mesh)) {
+        let records = || (0..).zip(&scene.instances).zip(&solids.records);
+        for ((number, instance), record) in records().filter(|((_, i), _)| !is_shared(i.mesh)) {
+            geometry.owners.push(Owner {
+                placement: 0,
+                first_triangle: geometry.triangles.len() as u32,
+                instance: number,
+                material: scene.meshes[instance.mesh as usize].material,
+            });
             let place = DAffine3 {
                 translation: instance.world_from_object.translation - origin,
                 ..instance.world_from_object
@@ -115,7 +124,7 @@ impl Geometry {
         geometry.groups[0].triangles = 0..geometry.triangles.len();
 
         let mut group_of = vec![None; scene.meshes.len()];
-        for (instance, record) in records().filter(|(i, _)| is_shared(i.mesh)) {
+        for ((number, instance), record) in records().filter(|((_, i), _)| is_shared(i.mesh)) {
             let group = *group_of[instance.mesh as usize].get_or_insert_with(|| {
                 let first = geometry.triangles.len();
                 let place = DAffine3::IDENTITY;
@@ -133,6 +142,12 @@ impl Geometry {
                     has_cutouts: false,
                 });
                 geometry.groups.len() - 1
+            });
+            geometry.owners.push(Owner {
+                placement: geometry.placements.len() as u32,
+                first_triangle: 0,
+                instance: number,
+                material: scene.meshes[instance.mesh as usize].material,
             });
             geometry.placements.push(Placement {
                 group,

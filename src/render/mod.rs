@@ -6,6 +6,7 @@ mod backend;
 mod emitters;
 mod environment;
 pub mod geometry;
+mod identity;
 mod light_tree;
 mod lights;
 mod media;
@@ -36,6 +37,7 @@ use crate::layout::{ProbeHit, ProbeRay};
 use crate::scene::Scene;
 use crate::settings::{BackendChoice, Settings};
 
+pub use identity::{Identities, Owner};
 pub use meter::Reading;
 pub use report::{
     Control, DeviceInfo, Feature, Ledger, Memory, Plan, Progress, Report, SceneModel, Times, Work,
@@ -75,6 +77,7 @@ pub struct Renderer {
     tuning: Tuning,
     tiles_per_batch: u32,
     pace: Pace,
+    owners: Vec<Owner>,
     report: Report,
     /// The complete passes of a render that failed.
     finished: Option<(Film, Work)>,
@@ -172,6 +175,7 @@ impl Renderer {
             tuning,
             tiles_per_batch: FIRST_BATCH_TILES.min(tuning.max_tiles),
             pace: Pace::default(),
+            owners: data.geometry.owners,
             report,
             finished: None,
         })

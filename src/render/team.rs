@@ -12,7 +12,8 @@ use std::time::{Duration, Instant};
 
 use super::passes::MAX_PASS_LEVEL;
 use super::{
-    Control, DeviceOptions, Ledger, PASS_SECONDS, Progress, Renderer, Report, Work, keep_finished,
+    Control, DeviceOptions, Identities, Ledger, PASS_SECONDS, Progress, Renderer, Report, Work,
+    keep_finished,
 };
 use crate::error::{Error, Result};
 use crate::fault;
@@ -138,6 +139,17 @@ impl Team {
         let result = self.rounds(&mut film, &mut work, samples, start, control);
         self.report.note(&film, &work, work.seconds);
         keep_finished(&mut self.finished, result, film, work)
+    }
+
+    /// As [`Renderer::identities`], by the first device.
+    ///
+    /// # Errors
+    /// As [`Renderer::identities`].
+    pub fn identities(&self) -> Result<Identities> {
+        match self.members.first() {
+            Some(first) => first.identities(),
+            None => Ok(Identities::default()),
+        }
     }
 
     /// As [`Renderer::take_finished`].

@@ -15,7 +15,7 @@ fn a_render_writes_every_output_with_its_header() {
     }
     let folder = scene();
     let options = "-o a.exr -o a.png --spp 16 --width 32 --seed 18446744073709551615 \
-                   --aov albedo,normal,depth,coverage,stderr,samples --exposure -1 --max-depth 2";
+                   --aov albedo,normal,depth,coverage,stderr,samples,instance,material --exposure -1 --max-depth 2";
     let output = render(&folder, options);
     assert_eq!(list(folder.path()), ["a.exr", "a.png", "scene.gltf"]);
     // piped, progress is plain lines
@@ -49,9 +49,11 @@ fn a_render_writes_every_output_with_its_header() {
     assert_eq!(first("coverage"), 0.0);
     assert_eq!(first("depth.Z"), f32::INFINITY);
     assert_eq!(first("samples"), 16.0);
+    assert_eq!(["instance", "material"].map(first), [-1.0; 2]);
     // the middle sees the square from 3 m, within a pixel's width of the axis
     let middle = |name: &str| image.channel(name).unwrap()[8 * 32 + 16];
     assert_eq!(middle("coverage"), 1.0);
+    assert_eq!(["instance", "material"].map(middle), [0.0; 2]);
     assert!((middle("depth.Z") - 3.0).abs() < 0.05);
     assert!((middle("normal.Z") - 1.0).abs() < 1e-4);
     // at the edges of the square samples differ

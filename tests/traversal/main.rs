@@ -20,6 +20,7 @@ mod statistics;
 mod brute;
 mod furnace;
 mod gap;
+mod identity;
 mod pictures;
 mod planes;
 mod scenes;

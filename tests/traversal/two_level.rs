@@ -12,7 +12,7 @@ use crate::scenes::{cube, fan, icosphere, lambert, look_at, scaled, scene};
 
 /// A floor, placed spheres and placed lamps; turned, stretched and mirrored. Lamps shine from the front only, so
 /// that a mirrored one that forgot to turn its winding would be dark.
-fn lamps() -> Scene {
+pub fn lamps() -> Scene {
     let turn = DMat3::from_quat(DQuat::from_axis_angle(DVec3::new(1., 2., -2.) / 3.0, 0.7));
     let stretch = DMat3::from_diagonal(DVec3::new(0.4, 1.2, 0.7));
     let mirror = DMat3::from_diagonal(DVec3::new(-1.0, 1.0, 1.0));
@@ -66,9 +66,9 @@ fn lamps() -> Scene {
     lamps_scene
 }
 
-/// Ids of the flattened scene as (instance of the scene, triangle of its mesh).
-fn from_flat(scene: &Scene, hit: &ProbeHit) -> (u32, u32) {
-    let mut left = hit.primitive;
+/// A triangle of the flattened scene as (instance of the scene, triangle of its mesh).
+pub fn from_flat(scene: &Scene, primitive: u32) -> (u32, u32) {
+    let mut left = primitive;
     for (index, instance) in scene.instances.iter().enumerate() {
         let count = scene.meshes[instance.mesh as usize].triangles.len() as u32;
         if left < count {
@@ -110,7 +110,7 @@ fn two_levels_equal_copies() {
         });
         let label = format!("two levels, {}", backend.name());
         let same = |a: &ProbeHit, b: &ProbeHit| {
-            from_flat(&scene, a) == from_two(&scene, b) && a.occluded == b.occluded
+            from_flat(&scene, a.primitive) == from_two(&scene, b) && a.occluded == b.occluded
         };
         other_ids(&label, &scene, &rays, sides, same);
         for instance in 0..=8 {

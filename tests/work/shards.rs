@@ -97,7 +97,7 @@ fn the_program_merges_files_to_the_image_of_one_run() {
     let folder = scene();
     let cornell = example("cornell");
     fs::copy(&cornell, folder.path().join("scene.gltf")).unwrap();
-    let all = "--width 24 --height 24 --max-depth 2 --aov stderr,samples,depth,normal --seed 7";
+    let all = "--width 24 --height 24 --max-depth 2 --aov stderr,samples,depth,normal,instance,material --seed 7";
     render(&folder, &format!("-o whole.exr --samples 2..29 {all}"));
     for (name, range) in [
         ("a", "2..3"),
