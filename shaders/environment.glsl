@@ -74,11 +74,14 @@ EnvironmentSample environment_sample(vec3 u, float coin)
     int height = int(params.env_height);
     uint count = params.env_width * (params.env_height + 1u);
     uint cell = min(uint(u.x * float(count)), count - 1u);
-    if (coin >= env_table[cell].keep) {
-        cell = env_table[cell].alias;
-    }
-    int row = int(cell / params.env_width);
-    int column = int(cell % params.env_width);
+    uvec2 entry = texelFetch(env_table, int(cell)).xy;
+    cell = coin < uintBitsToFloat(entry.x) ? cell : entry.y;
+    // Integers are divided lane by lane on CPUs. The quotient of floats is off by one at most.
+    int width = int(params.env_width);
+    int row = whole(floor(float(cell) / float(width)));
+    int column = int(cell) - row * width;
+    row += column < 0 ? -1 : (column >= width ? 1 : 0);
+    column += column < 0 ? width : (column >= width ? -width : 0);
     vec4 a = environment_texel(column, row - 1);
     vec4 b = environment_texel(column + 1, row - 1);
     vec4 c = environment_texel(column, row);

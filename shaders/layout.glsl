@@ -200,6 +200,14 @@ const uint WRAP_MIRROR = 1u;
 const uint WRAP_CLAMP = 2u;
 const uint FILTER_NEAREST = 0u;
 const uint FILTER_LINEAR = 1u;
+// Bits of TEXTURE_KINDS (spec.glsl): one for each slot that a material fills, one from here on for each that holds FORMAT_SRGB8 …
+const uint TEXTURE_KIND_SRGB = 8u;
+// … and what any of the textures is.
+const uint TEXTURE_KIND_RGBA16 = 16u;
+const uint TEXTURE_KIND_MIRROR = 17u;
+const uint TEXTURE_KIND_CLAMP = 18u;
+const uint TEXTURE_KIND_NEAREST = 19u;
+const uint TEXTURE_KIND_LINEAR = 20u;
 // `texels` starts with the 256 decoded sRGB values as float bits.
 const uint SRGB_TABLE = 256u;
 
@@ -240,7 +248,7 @@ const uint LIGHT_PLAIN = 0x80000000u;        // `intensity` is all: no texture, 
 const uint LIGHT_DOUBLE_SIDED = 0x40000000u; // emits from both sides
 const uint LIGHT_MIRRORED = 0x20000000u;     // the front sees its corners clockwise
 
-// Alias table over the cells between the centres of four texels of the environment map: env_height + 1 rows.
+// Alias table over the cells between the centres of four texels of the environment map: env_height + 1 rows. Read as two words.
 struct EnvCell {
     float keep;
     uint alias;
@@ -308,7 +316,7 @@ const uint BIND_TEXTURE_USES = 8u;   // texel buffer RGBA32UI: TextureUse[]
 const uint BIND_TEXELS = 9u;         // texel buffer R32UI
 const uint BIND_LIGHTS = 10u;        // texel buffer RGBA32UI: Light[]
 const uint BIND_ENV_MAP = 11u;       // texel buffer RGBA32F
-const uint BIND_ENV_TABLE = 12u;     // storage: EnvCell[]
+const uint BIND_ENV_TABLE = 12u;     // EnvCell[]
 const uint BIND_SCENE = 13u;         // acceleration structure (ray query)
 const uint BIND_BVH_NODES = 14u;     // texel buffer RGBA32UI, five texels a node (own BVH)
 const uint BIND_BVH_TRIANGLES = 15u; // texel buffer RGBA32UI, three texels a triangle (own BVH)

@@ -26,6 +26,12 @@ bool is_finite(vec3 v)
     return is_finite(v.x) && is_finite(v.y) && is_finite(v.z);
 }
 
+// x, a whole number from 0 to 2²³ − 1, by its bits: lavapipe converts lane by lane.
+int whole(float x)
+{
+    return floatBitsToInt(x + 8388608.0) - 0x4B000000;
+}
+
 float max_component(vec3 v)
 {
     return max(v.x, max(v.y, v.z));

@@ -55,10 +55,9 @@ uvec4 rng_key(uvec2 seed, uint pixel, uint sample_low, uint sample_high)
 }
 
 // A nested permutation of the binary digits after the point, chosen by two words for
-// each number. Adding the first word makes each result uniform by itself. [Burley20]
-uvec4 rng_owen(uvec4 digits, uvec4 add, uvec4 factor)
+// each number: the first digit is the lowest bit of v. Adding the first word makes each result uniform by itself. [Burley20]
+uvec4 rng_owen(uvec4 v, uvec4 add, uvec4 factor)
 {
-    uvec4 v = bitfieldReverse(digits);
     v ^= v * 0x3D20ADEAu;
     v += add;
     v *= factor | 1u;
@@ -82,10 +81,11 @@ uint rng_shuffle(uint place, uint word)
 // Point of the four-dimensional net of a block. x, y, z are place / size and Sobol's first two
 // numbers: a (0, m, 3)-net, whose cells of any shape hold one point each [Owen97]. No
 // fourth number does that with all of them; of those that miss least, w is one (t = 1), found by search.
+// The first digit after the point is the lowest bit.
 uvec4 rng_net(uint place)
 {
-    const uvec4 columns[BLOCK_LEVEL] = uvec4[](uvec4(1u, 8u, 8u, 8u) << 28u, uvec4(2u, 4u, 12u, 2u) << 28u,
-                                               uvec4(4u, 2u, 10u, 12u) << 28u, uvec4(8u, 1u, 15u, 11u) << 28u);
+    const uvec4 columns[BLOCK_LEVEL] = uvec4[](uvec4(8u, 1u, 1u, 1u), uvec4(4u, 2u, 3u, 4u), uvec4(2u, 4u, 5u, 3u),
+                                               uvec4(1u, 8u, 15u, 13u));
     uvec4 v = uvec4(0u);
     for (uint k = 0u; k < BLOCK_LEVEL; k++) {
         v ^= columns[k] * (place >> k & 1u);

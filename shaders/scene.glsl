@@ -8,7 +8,6 @@
 #include "spec.glsl"
 
 layout(binding = BIND_PARAMS, scalar) uniform ParamsBlock { Params params; };
-layout(binding = BIND_ENV_TABLE, scalar) readonly buffer EnvTableBlock { EnvCell env_table[]; };
 
 // wgpu has no texel buffers; the same records then are storage buffers.
 #ifdef WGPU
@@ -22,6 +21,7 @@ layout(binding = BIND_TEXTURE_USES, scalar) readonly buffer TextureUsesBlock { u
 layout(binding = BIND_TEXELS, scalar) readonly buffer TexelsBlock { uint texels[]; };
 layout(binding = BIND_LIGHTS, scalar) readonly buffer LightsBlock { uvec4 lights[]; };
 layout(binding = BIND_ENV_MAP, scalar) readonly buffer EnvMapBlock { vec4 env_map[]; };
+layout(binding = BIND_ENV_TABLE, scalar) readonly buffer EnvTableBlock { uvec2 env_table[]; };
 layout(binding = BIND_MEDIA, scalar) readonly buffer MediaBlock { uvec4 media[]; };
 #else
 layout(binding = BIND_INSTANCES) uniform usamplerBuffer instances;
@@ -33,6 +33,7 @@ layout(binding = BIND_TEXTURE_USES) uniform usamplerBuffer texture_uses;
 layout(binding = BIND_TEXELS) uniform usamplerBuffer texels;
 layout(binding = BIND_LIGHTS) uniform usamplerBuffer lights;
 layout(binding = BIND_ENV_MAP) uniform samplerBuffer env_map;
+layout(binding = BIND_ENV_TABLE) uniform usamplerBuffer env_table;
 layout(binding = BIND_MEDIA) uniform usamplerBuffer media;
 #endif
 

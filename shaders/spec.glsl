@@ -41,6 +41,7 @@ layout(constant_id = 21) const uint STRATEGY = 0u;         // STRATEGY_*
 // Flat pieces that are all tested before the own tree is walked (traverse_planes.glsl): the first ones, and the others.
 layout(constant_id = 22) const uint PARALLELOGRAM_COUNT = 0u;
 layout(constant_id = 23) const uint TRIANGLE_COUNT = 0u;
+layout(constant_id = 24) const uint TEXTURE_KINDS = 0xFFFFFFFFu; // which slots are filled, and with what: TEXTURE_KIND_*
 
 // Traversals ask surface_is_opaque of triangles that are marked.
 const bool HAS_CANDIDATES = HAS_ALPHA || HAS_NESTED;

@@ -133,14 +133,22 @@ vec2 surface_uv_at(TriangleUv uv, vec2 bary)
 // Value of a texture slot, or 1 where it is empty.
 vec4 surface_texture(Material material, uint slot, uvec4 triangle, vec2 bary)
 {
-    if (!HAS_TEXTURES || (material.flags & MATERIAL_HAS_TEXTURES) == 0u) {
+    if (!HAS_TEXTURES || !texture_may(slot)) {
+        return vec4(1.0);
+    }
+    // Before any branch: all slots share the first set.
+    vec2 uv = surface_uv_at(surface_uv(triangle, 0u), bary);
+    if ((material.flags & MATERIAL_HAS_TEXTURES) == 0u) {
         return vec4(1.0);
     }
     TextureUse use = scene_texture_use(material.first_texture + slot);
     if (use.first_texel == NONE) {
         return vec4(1.0);
     }
-    return texture_sample(use, surface_uv_at(surface_uv(triangle, use.uv_set), bary));
+    if (HAS_ATTRIBUTES && use.uv_set == 1u) {
+        uv = surface_uv_at(surface_uv(triangle, 1u), bary);
+    }
+    return texture_sample(use, slot, uv);
 }
 
 vec4 surface_vertex_color(uvec4 triangle, vec2 bary)
@@ -245,7 +253,7 @@ vec3 surface_mapped_normal(Material material, uint instance, uvec4 triangle, Tri
         return n;
     }
     TriangleUv uv = surface_uv(triangle, use.uv_set);
-    vec3 m = texture_sample(use, surface_uv_at(uv, bary)).xyz * 2.0 - 1.0;
+    vec3 m = texture_sample(use, TEXTURE_NORMAL, surface_uv_at(uv, bary)).xyz * 2.0 - 1.0;
     m.xy *= material.normal_scale;
 
     vec3 tangent;
@@ -321,6 +329,8 @@ SurfacePoint surface_point(Hit hit, vec3 wo)
     Material material = scene_material(triangle.w & TRIANGLE_MATERIAL_MASK);
 
     SurfacePoint s = surface_white();
+    vec4 base_color = surface_base_color(material, triangle, hit.bary);
+    s.base_color = base_color.rgb;
     // Edge form: it stays in the plane to two roundings, unlike a + b + c weighted.
     s.position = shape.v0 + hit.bary.x * shape.e1 + hit.bary.y * shape.e2;
     s.error = shape.error;
@@ -342,14 +352,11 @@ SurfacePoint surface_point(Hit hit, vec3 wo)
             float length2 = dot(interpolated, interpolated);
             n = length2 > 0.0 ? interpolated * inversesqrt(length2) : front;
         }
-        if (HAS_TEXTURES && (material.flags & MATERIAL_HAS_TEXTURES) != 0u) {
+        if (HAS_TEXTURES && texture_may(TEXTURE_NORMAL) && (material.flags & MATERIAL_HAS_TEXTURES) != 0u) {
             n = surface_mapped_normal(material, hit.instance, triangle, shape, hit.bary, n);
         }
         s.ns = surface_bend(s.is_front ? n : -n, s.ng, wo);
     }
-
-    vec4 base_color = surface_base_color(material, triangle, hit.bary);
-    s.base_color = base_color.rgb;
     s.alpha = HAS_BLEND && (material.flags & MATERIAL_BLEND) != 0u ? clamp(base_color.a, 0.0, 1.0) : 1.0;
     if (HAS_AREA_LIGHTS && (material.flags & MATERIAL_EMISSIVE) != 0u && (s.is_front || (material.flags & MATERIAL_DOUBLE_SIDED) != 0u)) {
         s.emission = surface_emission(material, triangle, hit.bary);

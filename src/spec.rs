@@ -56,6 +56,8 @@ pub struct Spec {
     pub parallelograms: u32,
     /// … and triangles.
     pub triangles: u32,
+    /// Which slots of materials are filled, and with what: bits `TEXTURE_KIND_*`.
+    pub texture_kinds: u32,
 }
 
 /// Features that plain kernels are compiled without (`PLAIN` in `shaders/spec.glsl`): these are half as
@@ -75,7 +77,7 @@ pub const NOT_PLAIN: [&str; 8] = [
 impl Spec {
     /// What the scene needs, before geometry is uploaded. `normals`, `attributes`,
     /// `instances`, `nested`, `inside`, `equiangular` and `light_tree` are settled by the upload,
-    /// which sees the meshes and the lights.
+    /// which sees the meshes and the lights; so is `texture_kinds`.
     pub fn for_scene(scene: &Scene, settings: &Settings) -> Self {
         let mut spec = Self {
             aovs: settings.aovs,
@@ -142,6 +144,7 @@ impl Spec {
             strategy: self.strategy,
             parallelograms: self.parallelograms,
             triangles: self.triangles,
+            texture_kinds: u32::MAX,
         }
     }
 
@@ -195,7 +198,8 @@ impl Spec {
             .zip(
                 flags
                     .into_iter()
-                    .chain([strategy, self.parallelograms, self.triangles]),
+                    .chain([strategy, self.parallelograms, self.triangles])
+                    .chain([self.texture_kinds]),
             )
             .collect()
     }

@@ -101,7 +101,15 @@ fn specialisation_constants_are_the_same_in_rust_and_glsl() {
         .features()
         .map(|(name, _)| format!("HAS_{}", name.to_uppercase().replace('-', "_")))
         .to_vec();
-    names.extend(["STRATEGY", "PARALLELOGRAM_COUNT", "TRIANGLE_COUNT"].map(String::from));
+    names.extend(
+        [
+            "STRATEGY",
+            "PARALLELOGRAM_COUNT",
+            "TRIANGLE_COUNT",
+            "TEXTURE_KINDS",
+        ]
+        .map(String::from),
+    );
     let ids: Vec<u32> = spec.constants().iter().map(|(id, _)| *id).collect();
     let rust: Vec<_> = ids.into_iter().zip(names).collect();
     assert_eq!(probe.spec_ids(), rust, "GLSL, then Rust");

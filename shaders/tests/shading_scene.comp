@@ -59,7 +59,7 @@ void main()
     } else if (push.kind == KIND_LIGHT) {
         answers[i] = light_answer(q.u);
     } else if (push.kind == KIND_TEXTURE) {
-        answers[i] = Answer(texture_sample(scene_texture_use(q.index.x), q.u.xy), vec4(0.0), vec4(0.0));
+        answers[i] = Answer(texture_sample(scene_texture_use(q.index.x), TEXTURE_BASE_COLOR, q.u.xy), vec4(0.0), vec4(0.0));
     } else if (push.kind == KIND_CAMERA) {
         Ray ray = camera_ray(q.index, q.u);
         answers[i] = Answer(vec4(ray.origin, 0.0), vec4(ray.direction, 0.0), vec4(0.0));

@@ -40,6 +40,8 @@ pub enum TexelFormat {
     Rgba32Uint,
     /// Four 32-bit floats.
     Rgba32Float,
+    /// Two 32-bit unsigned integers.
+    Rg32Uint,
     /// One 32-bit unsigned integer.
     R32Uint,
 }
@@ -49,6 +51,7 @@ impl TexelFormat {
     pub fn bytes(self) -> u64 {
         match self {
             Self::Rgba32Uint | Self::Rgba32Float => 16,
+            Self::Rg32Uint => 8,
             Self::R32Uint => 4,
         }
     }
@@ -57,6 +60,7 @@ impl TexelFormat {
         match self {
             Self::Rgba32Uint => vk::Format::R32G32B32A32_UINT,
             Self::Rgba32Float => vk::Format::R32G32B32A32_SFLOAT,
+            Self::Rg32Uint => vk::Format::R32G32_UINT,
             Self::R32Uint => vk::Format::R32_UINT,
         }
     }

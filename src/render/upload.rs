@@ -107,6 +107,7 @@ impl SceneData {
                     m.specular_color_texture,
                     m.transmission_texture,
                 ];
+                self.spec.texture_kinds |= texture_kinds(&slots, &scene.textures);
                 self.texture_uses
                     .extend(slots.map(|slot| texture_use(slot, &scene.textures, first_texels)));
             }
@@ -248,6 +249,29 @@ fn material(m: &Material) -> layout::Material {
         record.flags &= !layout::MATERIAL_SOLID;
     }
     record
+}
+
+/// What kernels have to know about the textures of a material: `TEXTURE_KIND_*`.
+fn texture_kinds(slots: &[Option<TextureRef>], textures: &[Texture]) -> u32 {
+    let filled = (0..).zip(slots).filter_map(|(i, slot)| Some((i, (*slot)?)));
+    filled.fold(0, |kinds, (i, slot): (u32, TextureRef)| {
+        let texture = &textures[slot.texture as usize];
+        let format = match texture.texels {
+            Texels::Rgba8 { srgb: false, .. } => 0,
+            Texels::Rgba8 { srgb: true, .. } => 1 << (layout::TEXTURE_KIND_SRGB + i),
+            Texels::Rgba16(_) => 1 << layout::TEXTURE_KIND_RGBA16,
+        };
+        let wrap = texture.wrap.map(|wrap| match wrap {
+            Wrap::Repeat => 0,
+            Wrap::Mirror => 1 << layout::TEXTURE_KIND_MIRROR,
+            Wrap::Clamp => 1 << layout::TEXTURE_KIND_CLAMP,
+        });
+        let filter = match texture.filter {
+            Filter::Nearest => 1 << layout::TEXTURE_KIND_NEAREST,
+            Filter::Linear => 1 << layout::TEXTURE_KIND_LINEAR,
+        };
+        kinds | 1 << i | format | wrap[0] | wrap[1] | filter
+    })
 }
 
 fn texture_use(

@@ -194,8 +194,14 @@ impl VulkanBackend {
             ),
             (
                 layout::BIND_ENV_TABLE,
-                storage,
-                upload(device, "environment table", &data.env_table)?,
+                BindingKind::Texel,
+                texel(
+                    device,
+                    "environment table",
+                    TexelFormat::Rg32Uint,
+                    &data.env_table,
+                    false,
+                )?,
             ),
         ];
 

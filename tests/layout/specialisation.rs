@@ -96,11 +96,21 @@ type Switch = (&'static str, fn(&mut Spec), &'static [u32]);
 
 #[test]
 fn each_feature_removes_code_and_its_buffers() {
-    let off: [Switch; 18] = [
+    let off: [Switch; 20] = [
         (
             "textures",
             |s| s.textures = false,
             &[layout::BIND_TEXTURE_USES, layout::BIND_TEXELS],
+        ),
+        (
+            "normal maps",
+            |s| s.texture_kinds &= !(1 << layout::TEXTURE_NORMAL),
+            &[],
+        ),
+        (
+            "textures of 16 bits",
+            |s| s.texture_kinds &= !(1 << layout::TEXTURE_KIND_RGBA16),
+            &[],
         ),
         ("alpha", |s| s.alpha = false, &[]),
         ("blend", |s| s.blend = false, &[]),

@@ -64,7 +64,7 @@ impl Scene {
             (layout::BIND_TEXELS, Texel),
             (layout::BIND_LIGHTS, Texel),
             (layout::BIND_ENV_MAP, Texel),
-            (layout::BIND_ENV_TABLE, Storage),
+            (layout::BIND_ENV_TABLE, Texel),
             (BIND_INPUT, Storage),
             (BIND_OUTPUT, Storage),
         ];
@@ -109,7 +109,7 @@ impl Scene {
             new(device, texel(TexelFormat::R32Uint), &self.texels),
             new(device, texel(TexelFormat::Rgba32Uint), &self.lights),
             new(device, texel(TexelFormat::Rgba32Float), &self.env_map),
-            new(device, Usage::STORAGE, &self.env_table),
+            new(device, texel(TexelFormat::Rg32Uint), &self.env_table),
         ]
     }
 }
