@@ -3,6 +3,8 @@
 use std::cell::RefCell;
 use std::path::{Path, PathBuf};
 use std::rc::Rc;
+use std::thread;
+use std::time::Duration;
 
 use etendue::film::Film;
 use etendue::image_io::{Channel, Image, Metadata, Tone, write_png};
@@ -35,6 +37,8 @@ const CONVERGED_ERROR: f64 = 0.001;
 const CONVERGED_SEED: u64 = 1 << 20;
 /// Samples of the render by which a budget is turned into samples.
 const PILOT_SPP: u64 = 8;
+/// Between two runs: threads of the last contender may wait actively for more to do.
+const REST: Duration = Duration::from_millis(200);
 
 /// A scene and how it is rendered.
 pub struct Contest<'a> {
@@ -179,7 +183,7 @@ impl Contest<'_> {
         Ok(())
     }
 
-    /// The runs: contenders alternate, so that all meet the same conditions.
+    /// The runs: contenders alternate, each seed beginning with another one, so that all meet the same conditions.
     fn compete(
         &self,
         scene: &str,
@@ -198,7 +202,11 @@ impl Contest<'_> {
             }
             let mut pictures: Vec<Vec<Picture>> = vec![Vec::new(); contenders.len()];
             for seed in 1..=self.args.seeds {
-                for (i, contender) in contenders.iter_mut().enumerate() {
+                let count = contenders.len();
+                for turn in 0..count {
+                    let i = (turn + seed as usize) % count;
+                    let contender = &mut contenders[i];
+                    thread::sleep(REST);
                     let shot = contender.render(spp, seed, &out.scratch())?;
                     let errors = truth.errors(&shot.picture);
                     let mean = mean(&shot.picture);
