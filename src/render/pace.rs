@@ -6,7 +6,7 @@
 /// The batches that are timed, true where lanes start together: what changes evenly from batch to batch cancels.
 const TRIALS: [bool; 4] = [false, true, true, false];
 /// A batch of fewer samples a lane says nothing: its paths end at much the same time.
-const MIN_SAMPLES: u32 = 4;
+const MIN_SAMPLES: u32 = 16;
 
 /// Rays and seconds of one kind.
 #[derive(Clone, Copy, Default)]

@@ -85,10 +85,10 @@ pub fn render_all(renderer: &mut Renderer, spp: u64, seed: u64) -> Result<Film> 
     renderer.render(&mut |_| Control::Continue)
 }
 
-/// Finds the size of batches that fits, which a first render only feels for.
+/// Finds the size of batches and the pace of lanes that fit, which a first render only feels for.
 pub fn warm_up(renderer: &mut Renderer) -> Result<()> {
     for _ in 0..2 {
-        render_all(renderer, 4, 0)?;
+        render_all(renderer, 16, 0)?;
     }
     Ok(())
 }
