@@ -3,6 +3,7 @@
 # and passes every check. Ends with one line a check and the time it took.
 #
 #   scripts/test.sh [ARGUMENTS OF cargo test …]
+#   ETENDUE_LINTS=1     also asks clippy, which takes minutes where nothing is built yet
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 source scripts/setup.sh
@@ -117,7 +118,9 @@ fi
 step "the program builds ($(cargo --version))" cargo build --release --locked
 step "the device that the tests use" "$CARGO_TARGET_DIR/release/etendue" info
 step "the shaders are valid SPIR-V for Vulkan 1.2 (spirv-val)" validate_shaders
-if cargo clippy --version >/dev/null 2>&1; then
+if [[ "${ETENDUE_LINTS:-}" != 1 ]]; then
+    skip "lints: ETENDUE_LINTS=1 asks for them"
+elif cargo clippy --version >/dev/null 2>&1; then
     step "no warnings (clippy)" cargo clippy --release --all-targets --locked --features faults -- -D warnings
 else
     skip "lints: clippy is not installed (Debian package rust-clippy)"
@@ -127,6 +130,8 @@ if ! at_least "$(rustc --version | cut -d' ' -f2)" "$WGPU_RUST_VERSION"; then
     skip "the feature wgpu: it needs Rust $WGPU_RUST_VERSION"
 elif [[ "${ETENDUE_NIGHTLY:-}" == 1 ]]; then
     step "pictures through wgpu are the same (nightly)" run_some --features wgpu --lib --test wgpu
+elif [[ "${ETENDUE_LINTS:-}" != 1 ]]; then
+    skip "the feature wgpu: ETENDUE_LINTS=1 asks for its lints, ETENDUE_NIGHTLY=1 for its tests"
 elif cargo clippy --version >/dev/null 2>&1; then
     step "no warnings with the feature wgpu (clippy)" cargo clippy --release --lib --bins --test wgpu --features wgpu --locked -- -D warnings
 else

@@ -78,12 +78,66 @@ fn cut_out() -> Scene {
     scene
 }
 
+/// A texture of 4 × 4 random texels in one of two formats.
+fn noise(seed: u32, is_wide: bool, srgb: bool, wrap: [Wrap; 2], filter: Filter) -> Texture {
+    let numbers = (0..64u32).map(|i| (i + 1 + 97 * seed).wrapping_mul(0x9E37_79B9) >> 16);
+    let texels = if is_wide {
+        Texels::Rgba16(numbers.map(|n| n as u16).collect())
+    } else {
+        let data = numbers.map(|n| n as u8).collect();
+        Texels::Rgba8 { data, srgb }
+    };
+    Texture {
+        name: format!("noise {seed}"),
+        width: 4,
+        height: 4,
+        texels,
+        wrap,
+        filter,
+    }
+}
+
+/// Every format, way to wrap and filter, in several slots.
+fn papered() -> Scene {
+    use Filter::{Linear, Nearest};
+    use Wrap::{Clamp, Mirror, Repeat};
+    let mut scene = empty();
+    scene.textures = vec![
+        noise(1, true, false, [Repeat, Mirror], Linear),
+        noise(2, false, true, [Clamp, Repeat], Linear),
+        noise(3, false, false, [Mirror, Clamp], Nearest),
+        noise(4, false, false, [Mirror, Repeat], Linear),
+    ];
+    // coordinates from -1.3 to 2.3
+    let slot = |texture| {
+        Some(TextureRef {
+            texture,
+            uv_set: 0,
+            uv_transform: [[3.6, 0.2, -1.3], [0.1, 3.6, -1.3]],
+        })
+    };
+    let mut floor = lambert(0.9);
+    floor.base_color_texture = slot(0);
+    let mut wall = metal(0.9, 0.8);
+    wall.base_color_texture = slot(1);
+    wall.metallic_roughness_texture = slot(2);
+    wall.normal_texture = slot(3);
+    let mut lamp = emitter(0.0, 4.0);
+    lamp.emission_texture = slot(1);
+    add(&mut scene, square(-Vec3::Y, Vec3::Y, 2.0), floor);
+    add(&mut scene, square(-Vec3::Z, Vec3::Z, 2.0), wall);
+    add(&mut scene, square(1.5 * Vec3::Y, -Vec3::Y, 0.5), lamp);
+    scene.cameras = vec![pinhole(DVec3::new(0.0, 1.0, 4.0), DVec3::ZERO, 40.0)];
+    scene
+}
+
 #[test]
 fn unused_features_do_not_change_the_picture() {
     for (name, scene) in [
         ("plain", plain()),
         ("mapped", mapped()),
         ("cut-out", cut_out()),
+        ("papered", papered()),
     ] {
         let settings = Settings {
             backend: BackendChoice::Bvh,

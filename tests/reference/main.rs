@@ -15,6 +15,9 @@
 mod common;
 #[path = "../common/statistics.rs"]
 mod statistics;
+#[allow(dead_code, reason = "other test programs use the rest")]
+#[path = "../common/tier.rs"]
+mod tier;
 mod tracer;
 
 mod compare;
