@@ -2,8 +2,8 @@
 """Blender's Cycles as a peer of etendue bench: pip install "bpy==4.5.*" numpy, on Python 3.11.
 
 On the CPU, without denoiser, clamps, adaptive sampling or light threshold; caustics unblurred. Cycles prepares a scene
-for every picture; what that takes is measured before each of them, by a picture of one sample, and subtracted from the
-seconds. Where it takes longer than the samples, as with many triangles and a small picture, what is left is noise.
+for every picture; what that takes is measured when the scene is loaded and subtracted from the seconds. Where it takes
+longer than the samples, as with many triangles and a small picture, what is left is noise.
 """
 import os
 import tempfile
@@ -325,25 +325,19 @@ class Cycles:
             add(read.textures, mesh, index)
         bpy.context.scene.world = world(read)
         bpy.context.scene.camera = camera(read)
-        # what is kept from one picture to the next is made now
-        self.timed(SAMPLERS[0], 1, 0)
+        self.overhead = 0.0
+        few, many = (min(self.render(SAMPLERS[0], spp, 0)[2] for _ in range(3)) for spp in (1, 17))
+        self.overhead = max(few - (many - few) / 16, 0.0)
         return SAMPLERS
 
-    def timed(self, sampler, spp, seed):
+    def render(self, sampler, spp, seed):
         scene = bpy.context.scene
         scene.cycles.samples = spp
         scene.cycles.seed = seed
         scene.cycles.sampling_pattern = PATTERNS[sampler]
         start = time.perf_counter()
         bpy.ops.render.render()
-        return time.perf_counter() - start
-
-    def render(self, sampler, spp, seed):
-        one = min(self.timed(sampler, 1, seed) for _ in range(2))
-        seconds = self.timed(sampler, spp, seed)
-        if spp > 1:
-            # the preparation is in both, and one of the samples
-            seconds = max((seconds - one) * spp / (spp - 1), 0.01 * seconds)
+        seconds = time.perf_counter() - start
         bpy.data.images["Render Result"].save_render(FILE)
         stored = bpy.data.images.load(FILE)
         stored.colorspace_settings.name = "Non-Color"
@@ -353,7 +347,7 @@ class Cycles:
         bpy.data.images.remove(stored)
         # from the bottom row up, with alpha
         picture = values.reshape(height, width, 4)[::-1, :, :3]
-        return picture, spp, seconds
+        return picture, spp, max(seconds - self.overhead, 0.05 * seconds)
 
 
 cycles = Cycles()
