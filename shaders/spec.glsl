@@ -15,10 +15,10 @@ layout(constant_id = 7) const bool HAS_AREA_LIGHTS = true; // emissive triangles
 layout(constant_id = 8) const bool HAS_PUNCTUAL = true;    // point, spot, directional
 layout(constant_id = 9) const bool HAS_INSTANCES = true;   // groups that are not in world space
 layout(constant_id = 10) const bool HAS_AOVS = true;
+layout(constant_id = 12) const bool HAS_PASSAGE = true;    // shadow rays go through surfaces that let light straight through
 #ifdef PLAIN
 // Scenes of opaque surfaces: what drivers need not read they need not prune at every start.
 const bool HAS_DIELECTRIC = false;
-const bool HAS_PASSAGE = false;
 const bool HAS_NESTED = false;
 const bool HAS_INSIDE = false;
 const bool HAS_MEDIA = false;
@@ -27,7 +27,6 @@ const bool HAS_EQUIANGULAR = false;
 const bool HAS_SENSOR = false;
 #else
 layout(constant_id = 11) const bool HAS_DIELECTRIC = true; // any material that transmits
-layout(constant_id = 12) const bool HAS_PASSAGE = true;    // shadow rays go through surfaces that let light straight through
 layout(constant_id = 13) const bool HAS_NESTED = true;     // solids that may overlap or touch
 layout(constant_id = 14) const bool HAS_INSIDE = true;     // the camera may be inside a solid
 layout(constant_id = 15) const bool HAS_MEDIA = true;      // anything that absorbs or scatters

@@ -63,9 +63,8 @@ pub struct Spec {
 /// Features that plain kernels are compiled without (`PLAIN` in `shaders/spec.glsl`): these are half as
 /// long, and drivers read a kernel at every start.
 #[doc(hidden)]
-pub const NOT_PLAIN: [&str; 8] = [
+pub const NOT_PLAIN: [&str; 7] = [
     "dielectric",
-    "passage",
     "nested",
     "inside",
     "media",
