@@ -6,8 +6,8 @@ use super::Renderer;
 use crate::error::Result;
 use crate::layout::{self, NONE, ProbeHit, ProbeRay};
 
-/// Rays that are traced at once: 72 bytes each, and far less than a second.
-const RAYS: usize = 1 << 18;
+/// Rays that are asked for at once: with what they meet 72 bytes each.
+const RAYS: usize = 1 << 20;
 
 /// Whose triangles follow in a placed group, up to the next one.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -20,6 +20,8 @@ use crate::spec;
 
 /// Records that mix integers and floats are read as integers, whose bits no device changes.
 pub(super) const RECORDS: TexelFormat = TexelFormat::Rgba32Uint;
+/// Single rays that are traced at once: 72 bytes each on the device, and far less than a second.
+const PROBE_RAYS: usize = 1 << 18;
 
 /// Opens the device that can run the choice; says which traversal and why.
 pub(super) fn open(
@@ -333,34 +335,38 @@ impl Backend for VulkanBackend {
         bindings.extend(self.traversal.bindings());
         let traversal = &self.traversal;
         let pipeline = traversal.probe_pipeline(&self.device, &self.spec, &bindings)?;
-        let input = upload(&self.device, "probe rays", rays)?;
-        let output = Buffer::new(
-            &self.device,
-            "probe hits",
-            (rays.len() * size_of::<ProbeHit>()).max(16) as u64,
-            Usage::STORAGE,
-            gpu::Memory::DeviceLocal,
-        )?;
-        let mut resources: Vec<_> = self
-            .shared
-            .iter()
-            .map(|(at, _, buffer)| (*at, Resource::Buffer(buffer)))
-            .collect();
-        resources.extend([
-            (layout::BIND_PROBE_RAYS, Resource::Buffer(&input)),
-            (layout::BIND_PROBE_HITS, Resource::Buffer(&output)),
-        ]);
-        resources.extend(self.traversal.resources());
-        let set = BindSet::new(&pipeline, "probe", &resources)?;
-        let push = layout::Batch {
-            sample_count: rays.len() as u32,
-            ..Default::default()
-        };
-        let groups = (rays.len() as u32).div_ceil(GROUP);
-        self.device.run("probe", |commands| {
-            traversal.launch(commands, &pipeline, &set, &push, groups);
-        })?;
-        output.read(rays.len())
+        let mut hits = Vec::with_capacity(rays.len());
+        for some in rays.chunks(PROBE_RAYS) {
+            let input = upload(&self.device, "probe rays", some)?;
+            let output = Buffer::new(
+                &self.device,
+                "probe hits",
+                (some.len() * size_of::<ProbeHit>()) as u64,
+                Usage::STORAGE,
+                gpu::Memory::DeviceLocal,
+            )?;
+            let mut resources: Vec<_> = self
+                .shared
+                .iter()
+                .map(|(at, _, buffer)| (*at, Resource::Buffer(buffer)))
+                .collect();
+            resources.extend([
+                (layout::BIND_PROBE_RAYS, Resource::Buffer(&input)),
+                (layout::BIND_PROBE_HITS, Resource::Buffer(&output)),
+            ]);
+            resources.extend(self.traversal.resources());
+            let set = BindSet::new(&pipeline, "probe", &resources)?;
+            let push = layout::Batch {
+                sample_count: some.len() as u32,
+                ..Default::default()
+            };
+            let groups = (some.len() as u32).div_ceil(GROUP);
+            self.device.run("probe", |commands| {
+                traversal.launch(commands, &pipeline, &set, &push, groups);
+            })?;
+            hits.extend(output.read::<ProbeHit>(some.len())?);
+        }
+        Ok(hits)
     }
 }
 
