@@ -4,18 +4,19 @@
 # should find it, the pages that tests write. Goes on after a failure, and ends with
 # what it proved and what it could not.
 #
-#   scripts/nightly.sh [stage…]     of: suite fuzz fresh farm stability mutants; all of them if none is named
+#   scripts/nightly.sh [stage…]     of: suite wgpu fuzz fresh farm stability mutants; all of them if none is named
 #   ETENDUE_SEED=N                  seed of the stage `fresh`; else another one each night
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 source scripts/setup.sh
+source scripts/binaries.sh
 unset DISPLAY WAYLAND_DISPLAY
 export ETENDUE_REQUIRE_DEVICE=1 RUST_TEST_THREADS=1 ETENDUE_NIGHTLY=1
 # A failure can be repeated with the seed that is printed.
 seed="${ETENDUE_SEED:-$(date +%s)}"
 unset ETENDUE_SEED
-log="$(mktemp)"
-trap 'rm -f "$log"' EXIT
+log="$work/suite"
+: >"$log"
 
 proved=()
 failed=()
@@ -36,7 +37,11 @@ stage() {
 }
 
 # What the tests print are the figures of docs/stability.md.
-whole_suite() { cargo test --release --locked --no-fail-fast -- --nocapture 2>&1 | tee "$log"; }
+whole_suite() {
+    build_faults && build_tests && cat "$work/faults.list" "$work/list" >"$work/all" &&
+        ETENDUE_GO_ON=1 run_binaries "$work/all" --nocapture | tee "$log" && cargo test --release --locked --doc
+}
+wgpu_pictures() { cargo test --release --locked --features wgpu --lib --test wgpu; }
 # Of tests whose law is known exactly (tests/common/statistics.rs): at least a thousand, by Kolmogorov and Smirnov at 1e-3.
 p_values() {
     ETENDUE_P_VALUES="$log" cargo test --release --locked --test statistics p_values_of_the_night -- --ignored --nocapture
@@ -44,8 +49,8 @@ p_values() {
 # Tests of chance hold for other seeds too, in all likelihood: a failure is worth a second night with the same
 # seed and more samples.
 fresh_seed() {
-    ETENDUE_NIGHTLY=0 ETENDUE_SEED="$seed" \
-        cargo test --release --locked --no-fail-fast --test integrator --test matter --test reference --test stability
+    build_tests && grep -E '/(integrator|matter|reference|stability)-[0-9a-f]*$' "$work/list" >"$work/chance" &&
+        ETENDUE_NIGHTLY=0 ETENDUE_SEED="$seed" ETENDUE_GO_ON=1 run_binaries "$work/chance"
 }
 farms() { scripts/farm.sh; }
 pages() { ETENDUE_STABILITY_LOG="$log" scripts/stability.sh; }
@@ -56,7 +61,7 @@ unchanged() {
 }
 
 stages=("$@")
-(($# > 0)) || stages=(suite fuzz fresh farm stability mutants)
+(($# > 0)) || stages=(suite wgpu fuzz fresh farm stability mutants)
 printf 'nightly.sh: seed %s, stages: %s\n' "$seed" "${stages[*]}"
 for name in "${stages[@]}"; do
     case "$name" in
@@ -64,6 +69,7 @@ for name in "${stages[@]}"; do
             stage "every test passes with the counts of the night" whole_suite
             stage "the p-values of all tests together are uniform" p_values
             ;;
+        wgpu) stage "pictures through wgpu are the same" wgpu_pictures ;;
         fuzz) stage "a million damaged files of every kind do no harm" fuzzing ;;
         fresh) stage "the pictures of known answers hold for seed $seed" fresh_seed ;;
         farm) stage "Slurm and Open Job Description give the picture of one run, with a task killed on the way" farms ;;

@@ -7,15 +7,12 @@
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 source scripts/setup.sh
+source scripts/binaries.sh
 # A software driver must not look for a display.
 unset DISPLAY WAYLAND_DISPLAY
 # Nothing may pass by being skipped. Tests of a process run one after another: they share devices,
 # kernels and the memory that some of them measure.
 export ETENDUE_REQUIRE_DEVICE=1 RUST_TEST_THREADS=1
-# Compiling a kernel takes one core, rendering all of them: two processes keep two cores busy.
-readonly AT_ONCE=2
-# Those that take longest, first, so that none of them is left at the end.
-readonly LONGEST=(reference matter integrator traversal stability compare work faults layout cli shading measure fuzz)
 readonly WGPU_RUST_VERSION=1.87
 
 summary=()
@@ -51,52 +48,14 @@ validate_shaders() {
     echo "$count modules are valid"
 }
 
-# Where logs and the program with the feature faults are for as long as this runs.
-work="$(mktemp -d)"
-trap 'rm -rf "$work"' EXIT
-export work
-
-# The test binaries of a build, by cargo's messages.
-binaries() {
-    cargo test --release --locked --no-run --message-format=json-render-diagnostics "$@" >"$work/messages" || return 1
-    sed -nE 's/.*"profile":\{[^}]*"test":true\}.*"executable":"([^"]*)".*/\1/p' "$work/messages"
-}
-
-# These tests need a program that has the feature too. It lies where the others look for theirs, so it is put aside.
-build_faults() {
-    binaries --features faults --test faults >"$work/faults.list" || return 1
-    cp "$CARGO_TARGET_DIR/release/etendue" "$work/etendue-faults"
-}
-
-build_tests() { binaries >"$work/list" && [[ -s "$work/list" ]]; }
-
-# One binary; what it prints stays together. 255 ends xargs.
-run_binary() {
-    local name log="$work/log.${1##*-}" code=0
-    name="$(basename "${1%-*}")"
-    [[ "$name" != faults ]] || export ETENDUE_TEST_PROGRAM="$work/etendue-faults"
-    local TIMEFORMAT="-- $name: %0R s, %0U + %0S s of processor time"
-    { time CARGO=cargo "$1" >"$log" 2>&1; } 2>"$log.time" || code=255
-    flock "$work/lock" cat "$log.time" "$log"
-    return $code
-}
-export -f run_binary
-
-# The longest binaries first.
-ordered() {
-    local name
-    for name in "${LONGEST[@]}"; do grep "/$name-[0-9a-f]*\$" "$1"; done
-    grep -vE "/($(IFS='|' && echo "${LONGEST[*]}"))-[0-9a-f]*\$" "$1"
-}
-
 # Tests leave a core idle now and then, which is enough for the documentation.
 run_all() {
     local documentation
-    cat "$work/faults.list" "$work/list" >"$work/all"
     # cargo runs the tests in it by itself
     (cargo test --release --locked --doc && document) >"$work/documentation" 2>&1 &
     documentation=$!
-    ordered "$work/all" | xargs -P "$AT_ONCE" -I{} bash -c 'run_binary {}' || { kill "$documentation"; return 1; }
+    cat "$work/faults.list" "$work/list" >"$work/all"
+    run_binaries "$work/all" || { kill "$documentation"; return 1; }
     wait "$documentation" || { cat "$work/documentation"; return 1; }
     awk '/^test result: ok/ { n += $4 } END { print n + 0, "tests passed" }' "$work"/log.*
 }
