@@ -211,19 +211,25 @@ bool bvh_intersect(BvhRay ray, uint record, uvec4 v0, uint instance, float t_min
     return true;
 }
 
-// The stack of groups that wait, its two newest entries in registers. On
-// lavapipe a masked store to indexed memory costs more than a box test, and a
-// branch is only skipped when it holds more than a few instructions; spilling
-// two at a time is rare and long enough. An entry's second word is never 0.
-uvec2 bvh_spilled[BVH_STACK_SIZE];
-uint bvh_height; // entries in bvh_spilled, even
+// The stack of groups that wait: its two newest entries, and the others in pairs below them. On lavapipe a masked
+// store to indexed memory becomes a branch for each lane and word, so the two oldest pairs are chosen by comparison;
+// more are rare. An entry's second word is never 0.
 uvec2 bvh_newest;
-uvec2 bvh_older; // 0 where bvh_newest is
+uvec2 bvh_older;      // 0 where bvh_newest is
+uint bvh_height;      // entries below them, even
+uvec4 bvh_first_pair; // the older entry before the newer one
+uvec4 bvh_second_pair;
+uvec2 bvh_spilled[BVH_STACK_SIZE]; // at their height
 
 void bvh_push(uvec2 entry) {
     if (bvh_older.y != 0u) {
-        bvh_spilled[bvh_height] = bvh_older;
-        bvh_spilled[bvh_height + 1u] = bvh_newest;
+        uvec4 pair = uvec4(bvh_older, bvh_newest);
+        bvh_first_pair = bvh_height == 0u ? pair : bvh_first_pair;
+        bvh_second_pair = bvh_height == 2u ? pair : bvh_second_pair;
+        if (bvh_height >= 4u) {
+            bvh_spilled[bvh_height] = bvh_older;
+            bvh_spilled[bvh_height + 1u] = bvh_newest;
+        }
         bvh_height += 2u;
         bvh_newest = uvec2(0u);
     }
@@ -238,8 +244,10 @@ uvec2 bvh_pop() {
     bvh_older = uvec2(0u);
     if (entry.y == 0u && bvh_height != 0u) {
         bvh_height -= 2u;
-        bvh_newest = bvh_spilled[bvh_height];
-        entry = bvh_spilled[bvh_height + 1u];
+        uvec4 pair = bvh_height == 2u ? bvh_second_pair : bvh_first_pair;
+        if (bvh_height >= 4u) pair = uvec4(bvh_spilled[bvh_height], bvh_spilled[bvh_height + 1u]);
+        bvh_newest = pair.xy;
+        entry = pair.zw;
     }
     return entry;
 }
