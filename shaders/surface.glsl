@@ -71,6 +71,8 @@ uvec4 surface_triangle(uint instance, uint primitive)
 // Squares of edges over area up to which a triangle is not thin, and beyond which no more is added.
 const float PLAIN_THINNESS = 8.0;
 const float MAX_THINNESS = 1.0e4;
+// Share of a triangle's height by which places are moved from an edge at most; see surface_within.
+const float MAX_INSET = 1.0 / 64.0;
 
 // Bound on the error of each component of a point computed by the edge form,
 // where `magnitude` bounds the terms that were summed, and on that of the distance
@@ -321,6 +323,21 @@ vec3 surface_step(SurfacePoint s, vec3 d)
     return cosine > MIN_STRAIGHT_COSINE ? (height / cosine) * d : -height * s.ng;
 }
 
+// Weights of a place on a triangle, moved from its edges by twice the plain bound on the error: rounding puts places beyond
+// an edge and behind the neighbour's plane, where a ray would leave a closed room. Triangles that are hardly
+// higher than that keep their places.
+vec2 surface_within(TriangleShape shape, float doubled_area, vec2 bary)
+{
+    vec3 third = shape.e2 - shape.e1;
+    vec3 reach = abs(shape.v0) + abs(shape.e1) + abs(shape.e2);
+    float bound = 2.0 * POSITION_ROUNDINGS * EPSILON * max_component(reach);
+    vec3 least = bound / doubled_area * vec3(length(third), length(shape.e2), length(shape.e1));
+    least = mix(vec3(0.0), least, lessThan(least, vec3(MAX_INSET)));
+    vec3 weights = vec3(1.0 - bary.x - bary.y, bary);
+    vec3 moved = max(weights, least);
+    return moved == weights ? bary : moved.yz / (moved.x + moved.y + moved.z);
+}
+
 // Everything about the point that a ray from direction −wo met.
 SurfacePoint surface_point(Hit hit, vec3 wo)
 {
@@ -331,12 +348,14 @@ SurfacePoint surface_point(Hit hit, vec3 wo)
     SurfacePoint s = surface_white();
     vec4 base_color = surface_base_color(material, triangle, hit.bary);
     s.base_color = base_color.rgb;
-    // Edge form: it stays in the plane to two roundings, unlike a + b + c weighted.
-    s.position = shape.v0 + hit.bary.x * shape.e1 + hit.bary.y * shape.e2;
-    s.error = shape.error;
-    s.record = hit.record;
     vec3 cross_edges = cross(shape.e1, shape.e2);
     float doubled_area = length(cross_edges);
+    // Rays that pass faces of touching solids stay on their line (interior.glsl).
+    vec2 place = HAS_NESTED ? hit.bary : surface_within(shape, doubled_area, hit.bary);
+    // Edge form: it stays in the plane to two roundings, unlike a + b + c weighted.
+    s.position = shape.v0 + place.x * shape.e1 + place.y * shape.e2;
+    s.error = shape.error;
+    s.record = hit.record;
     vec3 front = cross_edges / doubled_area * (shape.is_mirrored ? -1.0 : 1.0);
     s.area = 0.5 * doubled_area;
     s.is_front = dot(front, wo) >= 0.0;

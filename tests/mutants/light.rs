@@ -235,6 +235,13 @@ pub const MUTANTS: &[Mutant] = &[
         ],
     },
     Mutant {
+        name: "edge-places",
+        wrong: "places of hits are not kept within their triangles",
+        file: "shaders/surface.glsl",
+        edits: &[("return moved == weights ?", "return weights == weights ?")],
+        killers: &["stability::scales::closed_rooms_are_dark_under_a_sun"],
+    },
+    Mutant {
         name: "cut-out-ignored",
         wrong: "cut-outs are solid",
         file: "shaders/surface.glsl",

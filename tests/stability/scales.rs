@@ -2,7 +2,7 @@
 
 use etendue::film::Film;
 use etendue::render::Tuning;
-use etendue::scene::{Medium, Mesh, Phase, Scene};
+use etendue::scene::{LightKind, Medium, Mesh, Phase, PunctualLight, Scene};
 use etendue::settings::{BackendChoice, Settings, Strategy};
 use glam::{DAffine3, DMat3, DQuat, DVec3, Vec3};
 
@@ -116,15 +116,17 @@ fn random_solid(random: &mut Random, size: f64) -> Mesh {
     mesh
 }
 
-/// In a white world a grey convex solid shows its albedo; a ray that meets its own start shows less.
+/// In a white world a grey convex solid shows its albedo; a ray that meets its own start shows less. Fronts glow, so that
+/// a camera's ray which saw the far face of an edge, that it met within rounding of the near one, is told apart: it lacks the glow.
 /// Half of the solids are instances that are not copied, up to 10⁵ times their size from the origin, which the
 /// other instance holds where it is.
 #[test]
 fn rays_leave_random_solids_of_all_scales() {
     const ALBEDO: f32 = 0.5;
+    const GLOW: f32 = 8.0;
     for backend in pair() {
         let mut random = Random(2026);
-        let (mut left, mut met) = (0u64, 0.0f64);
+        let (mut left, mut met, mut far_faces) = (0u64, 0.0f64, 0.0f64);
         let samples = count(256, 8192);
         for round in 0..count(1, 4) {
             for k in -6..=6 {
@@ -138,7 +140,7 @@ fn rays_leave_random_solids_of_all_scales() {
                 add_at(
                     &mut scene,
                     mesh,
-                    lambert(ALBEDO),
+                    emitter(ALBEDO, GLOW),
                     DAffine3::from_translation(at),
                 );
                 if is_held {
@@ -165,17 +167,25 @@ fn rays_leave_random_solids_of_all_scales() {
                 };
                 let coverage = r.film.coverage().unwrap();
                 for (mean, hit) in r.film.mean().iter().zip(coverage) {
-                    let expected = f64::from(1.0 - (1.0 - ALBEDO) * hit);
-                    let lack = (expected - f64::from(mean[0])).abs();
+                    let expected = f64::from(1.0 + (GLOW + ALBEDO - 1.0) * hit);
+                    let lack = (expected - f64::from(mean[0])).abs() * samples as f64;
                     left += (f64::from(hit) * samples as f64).round() as u64;
-                    // A second meeting takes half of what the sample brought, or more.
-                    if lack > 0.1 / samples as f64 {
-                        met += (lack * samples as f64 / 0.25).ceil();
+                    // A second meeting takes half of what the world brought, or more; a far face takes half of the glow, or all.
+                    if lack > 0.4 * f64::from(GLOW) {
+                        far_faces += (lack / f64::from(GLOW + ALBEDO)).ceil();
+                    } else if lack > 0.1 {
+                        met += (lack / 0.25).ceil();
                     }
                 }
             }
         }
-        println!("{backend:?}: {left} rays left, {met} met their surface again");
+        println!(
+            "{backend:?}: {left} rays left, {met} met their surface again; {far_faces} rays of cameras saw the far face of an edge"
+        );
+        assert!(
+            far_faces <= 1e-6 * left as f64 + 1.0,
+            "{backend:?}: {far_faces}"
+        );
         let rate = met / left as f64;
         // Our own tree: none. What a driver computes is not ours to bound.
         let most = if backend == BackendChoice::Bvh {
@@ -236,5 +246,39 @@ fn paths_in_glass_keep_their_side() {
         println!("{backend:?}: {paths} paths, {rays} rays, {lit} pixels saw light");
         assert_eq!(lit, 0, "{backend:?}");
         assert!(rays >= count(1_000_000, 100_000_000));
+    }
+}
+
+/// A closed white room is black inside whatever shines outside: no place on a wall is beyond the next wall. A sample that
+/// leaked would bring the sun or the sky. Rays within a millionth of edges and corners would leak first.
+#[test]
+fn closed_rooms_are_dark_under_a_sun() {
+    let mut scene = empty();
+    add(&mut scene, room(1.0), lambert(0.95));
+    scene.lights.push(PunctualLight {
+        name: String::new(),
+        kind: LightKind::Directional,
+        position: DVec3::ZERO,
+        direction: Vec3::new(-0.3, -0.8, -0.5).normalize(),
+        intensity: Vec3::splat(1e6),
+    });
+    scene.environment = constant_sky(1.0);
+    let eye = DVec3::new(0.1, 0.2, 0.3);
+    let edge = DVec3::new(-1.0, 0.4, 1.0);
+    let corner = DVec3::new(-1.0, -1.0, 1.0);
+    for (what, camera, samples) in [
+        ("room", pinhole(eye, edge, 90.0), count(64, 4096)),
+        ("edge", parallel(eye, edge, 1e-6), count(16, 1024)),
+        ("corner", parallel(eye, corner, 1e-6), count(16, 1024)),
+    ] {
+        scene.cameras = vec![camera];
+        let Some(r) = render(&scene, &settings(32, samples), Tuning::default()) else {
+            return;
+        };
+        let rays = r.report.rays;
+        let lit = r.film.mean().iter().filter(|m| m[0] != 0.0).count();
+        println!("{what}: {rays} rays in a closed room, {lit} pixels saw light");
+        assert_eq!(lit, 0, "{what}");
+        assert!(rays >= count(300_000, 20_000_000), "{what}: {rays}");
     }
 }
