@@ -123,10 +123,6 @@ Boundary interior_boundary(Interior here, Hit hit, SurfacePoint s, vec3 d, inout
     b.before = here.current;
     surface_skip.is_search = true;
     surface_skip.direction = d;
-    surface_skip.count = here.count;
-    for (uint k = 0u; k < here.count; k++) {
-        surface_skip.solids[k] = uvec2(here.entered[k].x | SKIP_HELD | SKIP_HOLDS, here.entered[k].y);
-    }
     // What lies there is met once more, backwards from a little beyond: of the faces of each solid the last one says whether
     // the ray is in it afterwards. So it does not matter where a search ends, nor that the next one meets some of them again.
     // Where the order of a front and a back is not known, a corner or an edge was touched, and the solid stays what it was.
@@ -135,48 +131,62 @@ Boundary interior_boundary(Interior here, Hit hit, SurfacePoint s, vec3 d, inout
     float step = bound / cosine;
     vec3 origin = s.position + SEARCH_BEYOND * (cosine > MIN_STRAIGHT_COSINE ? step * d : -bound * s.ng);
     float at[SKIP_SIZE];
-    uvec2 solid = uvec2(s.material, hit.instance);
-    bool is_front = s.is_front;
-    bool is_first = true;
-    float t_min = 0.0;
+    uvec2 own = uvec2(s.material, hit.instance);
     bool fits = true;
-    for (uint k = 0u; k < 2u * SKIP_SIZE; k++) {
-        if (!is_first) {
-            rays++;
-            if (!trace_closest(origin, -d, t_min, (SEARCH_BEFORE + SEARCH_BEYOND) * step, NONE, hit)) {
+    // At first the face that the ray met is believed. Where two other solids are found an edge is near, which the way back, rounded
+    // anew, may pass on another side: then that face counts only if it is met again.
+    for (uint attempt = 0u; attempt < 2u; attempt++) {
+        surface_skip.count = here.count;
+        for (uint k = 0u; k < here.count; k++) {
+            surface_skip.solids[k] = uvec2(here.entered[k].x | SKIP_HELD | SKIP_HOLDS, here.entered[k].y);
+        }
+        uint others = 0u;
+        float t_min = 0.0;
+        for (uint k = 0u; k < 2u * SKIP_SIZE; k++) {
+            bool is_own = attempt == 0u && k == 0u;
+            uvec2 solid = own;
+            bool is_front = s.is_front;
+            float t = SEARCH_BEYOND * step;
+            if (!is_own) {
+                rays++;
+                if (!trace_closest(origin, -d, t_min, (SEARCH_BEFORE + SEARCH_BEYOND) * step, NONE, hit)) {
+                    break;
+                }
+                SurfaceSide other = surface_side(hit.instance, hit.primitive, d);
+                if (!other.is_solid) {
+                    t_min = hit.t;
+                    continue;
+                }
+                solid = uvec2(other.material, hit.instance);
+                is_front = other.is_front;
+                t = hit.t;
+            }
+            uint slot = surface_skip_slot(solid);
+            fits = slot < SKIP_SIZE;
+            if (!fits) {
                 break;
             }
-            SurfaceSide other = surface_side(hit.instance, hit.primitive, d);
-            if (!other.is_solid) {
-                t_min = hit.t;
-                continue;
+            if (slot == surface_skip.count) {
+                surface_skip.solids[slot] = solid;
+                surface_skip.count++;
             }
-            solid = uvec2(other.material, hit.instance);
-            is_front = other.is_front;
+            uint flags = surface_skip.solids[slot].x & SKIP_FLAGS;
+            bool was_held = (flags & SKIP_HELD) != 0u;
+            bool holds = is_front;
+            if ((flags & SKIP_FOUND) != 0u) {
+                float later = at[slot] - t;
+                holds = abs(later) <= SEARCH_TIE * step ? was_held : (later > 0.0) == is_front;
+                flags |= SKIP_SETTLED;
+            } else {
+                flags |= SKIP_FOUND | (!is_own && is_front == was_held ? SKIP_SETTLED : 0u);
+                at[slot] = t;
+                others += solid == own ? 0u : 1u;
+            }
+            surface_skip.solids[slot].x = solid.x | (flags & ~SKIP_HOLDS) | (holds ? SKIP_HOLDS : 0u);
         }
-        uint slot = surface_skip_slot(solid);
-        fits = slot < SKIP_SIZE;
-        if (!fits) {
+        if (others < 2u) {
             break;
         }
-        if (slot == surface_skip.count) {
-            surface_skip.solids[slot] = solid;
-            surface_skip.count++;
-        }
-        uint flags = surface_skip.solids[slot].x & SKIP_FLAGS;
-        bool was_held = (flags & SKIP_HELD) != 0u;
-        bool holds = is_front;
-        float t = is_first ? SEARCH_BEYOND * step : hit.t;
-        if ((flags & SKIP_FOUND) != 0u) {
-            float later = at[slot] - t;
-            holds = abs(later) <= SEARCH_TIE * step ? was_held : (later > 0.0) == is_front;
-            flags |= SKIP_SETTLED;
-        } else {
-            flags |= SKIP_FOUND | (!is_first && is_front == was_held ? SKIP_SETTLED : 0u);
-            at[slot] = t;
-        }
-        surface_skip.solids[slot].x = solid.x | (flags & ~SKIP_HOLDS) | (holds ? SKIP_HOLDS : 0u);
-        is_first = false;
     }
     b.beyond.count = 0u;
     for (uint k = 0u; k < surface_skip.count; k++) {
