@@ -216,7 +216,7 @@ PathState path_start(uvec4 key, uvec2 pixel)
 SurfacePoint path_sensor()
 {
     SurfacePoint s = surface_white();
-    s.position = params.camera_position;
+    s.position = s.start = params.camera_position;
     // It may lie on a surface of the scene.
     s.error = vec3(POSITION_ROUNDINGS * EPSILON) * (abs(s.position) + params.camera_right.x);
     s.ng = s.ns = params.camera_forward;
@@ -258,7 +258,7 @@ void path_surface(inout PathState path, inout PathResult result, SurfacePoint s,
 {
     vec3 wo = -path.ray.direction;
     vec3 wo_local = wo * frame;
-    vec3 far_side = offset_origin(s.position, s.error, -s.ng);
+    vec3 far_side = offset_origin(s.start, s.error, -s.ng);
     // A surface that covers a part of the light lets the rest pass straight on.
     bool is_passed = HAS_BLEND && s.alpha < 1.0 && rng_uniform(path.key, path.event, SLOT_COVER).x >= s.alpha;
     if (!is_passed) {
@@ -294,7 +294,7 @@ void path_surface(inout PathState path, inout PathResult result, SurfacePoint s,
             BsdfValue value = bsdf_eval(bsdf, wo_local, light.wi * frame);
             float weight = direct_light_weight(light.is_delta, light.pdf, value.pdf);
             vec3 contribution = (weight / light.pdf) * path.beta * value.f_cos * light.radiance;
-            vec3 origin = is_beyond ? far_side : offset_origin(s.position, s.error, s.ng);
+            vec3 origin = is_beyond ? far_side : offset_origin(s.start, s.error, s.ng);
             Interior there = path.interior;
             float scale = path.scale;
             if (is_beyond && is_solid) {
@@ -312,7 +312,7 @@ void path_surface(inout PathState path, inout PathResult result, SurfacePoint s,
         return;
     }
     path.beta *= next.weight;
-    vec3 origin = offset_origin(s.position, s.error, s.ng);
+    vec3 origin = offset_origin(s.start, s.error, s.ng);
     if (HAS_DIELECTRIC && next.is_transmitted) {
         origin = far_side;
         if (is_solid) {

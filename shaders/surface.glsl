@@ -23,6 +23,7 @@ const float MIN_STRAIGHT_COSINE = 0.1;
 
 struct SurfacePoint {
     vec3 position;
+    vec3 start;        // of rays: the position, kept within the triangle
     vec3 error;        // bound on the error of each component of position
     uint record;       // of the hit: what a ray that starts here does not meet
     vec3 ng;           // unit geometric normal on the side of wo
@@ -71,7 +72,7 @@ uvec4 surface_triangle(uint instance, uint primitive)
 // Squares of edges over area up to which a triangle is not thin, and beyond which no more is added.
 const float PLAIN_THINNESS = 8.0;
 const float MAX_THINNESS = 1.0e4;
-// Share of a triangle's height by which places are moved from an edge at most; see surface_within.
+// Share of a triangle's height by which starts of rays are moved from an edge at most; see surface_within.
 const float MAX_INSET = 1.0 / 64.0;
 
 // Bound on the error of each component of a point computed by the edge form,
@@ -324,8 +325,8 @@ vec3 surface_step(SurfacePoint s, vec3 d)
 }
 
 // Weights of a place on a triangle, moved from its edges by twice the plain bound on the error: rounding puts places beyond
-// an edge and behind the neighbour's plane, where a ray would leave a closed room. Triangles that are hardly
-// higher than that keep their places.
+// an edge and behind the neighbour's plane, where a ray would leave a closed room. Where a triangle is hardly
+// higher than that, they are left.
 vec2 surface_within(TriangleShape shape, float doubled_area, vec2 bary)
 {
     vec3 third = shape.e2 - shape.e1;
@@ -350,10 +351,11 @@ SurfacePoint surface_point(Hit hit, vec3 wo)
     s.base_color = base_color.rgb;
     vec3 cross_edges = cross(shape.e1, shape.e2);
     float doubled_area = length(cross_edges);
+    // Edge form: it stays in the plane to two roundings, unlike a + b + c weighted.
+    s.position = shape.v0 + hit.bary.x * shape.e1 + hit.bary.y * shape.e2;
     // Rays that pass faces of touching solids stay on their line (interior.glsl).
     vec2 place = HAS_NESTED ? hit.bary : surface_within(shape, doubled_area, hit.bary);
-    // Edge form: it stays in the plane to two roundings, unlike a + b + c weighted.
-    s.position = shape.v0 + place.x * shape.e1 + place.y * shape.e2;
+    s.start = shape.v0 + place.x * shape.e1 + place.y * shape.e2;
     s.error = shape.error;
     s.record = hit.record;
     vec3 front = cross_edges / doubled_area * (shape.is_mirrored ? -1.0 : 1.0);

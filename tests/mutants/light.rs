@@ -236,7 +236,7 @@ pub const MUTANTS: &[Mutant] = &[
     },
     Mutant {
         name: "edge-places",
-        wrong: "places of hits are not kept within their triangles",
+        wrong: "rays do not start within their triangles",
         file: "shaders/surface.glsl",
         edits: &[("return moved == weights ?", "return weights == weights ?")],
         killers: &["stability::scales::closed_rooms_are_dark_under_a_sun"],
