@@ -54,6 +54,7 @@ pub const SHADERS: &[(&str, &[&str], &str)] = &[
     ("trace.rmiss", &[], "trace_miss"),
     ("trace.rchit", &[], "trace_closest_hit"),
     ("trace.rahit", &[], "trace_any_hit"),
+    ("trace.rint", &[], "trace_intersection"),
     ("tests/resources.comp", &[], "test_resources"),
     ("tests/rays.comp", &[], "test_rays"),
     (
@@ -62,6 +63,7 @@ pub const SHADERS: &[(&str, &[&str], &str)] = &[
         "test_rays_pipeline",
     ),
     ("tests/rays.rahit", &[], "test_rays_any_hit"),
+    ("tests/rays.rint", &[], "test_rays_intersection"),
     ("tests/shading_samplers.comp", &[], "test_shading_samplers"),
     ("tests/shading_values.comp", &[], "test_shading_values"),
     ("tests/shading_random.comp", &[], "test_shading_random"),
@@ -85,6 +87,7 @@ fn kind(source: &str) -> shaderc::ShaderKind {
         Some("rmiss") => Kind::Miss,
         Some("rchit") => Kind::ClosestHit,
         Some("rahit") => Kind::AnyHit,
+        Some("rint") => Kind::Intersection,
         _ => panic!("{source}: no stage has this suffix"),
     }
 }

@@ -14,12 +14,11 @@
 // Solids that may hold one point; more are counted in the ledger.
 const uint INTERIOR_SIZE = 8u;
 
-// Where faces are looked for that coincide with one, and what is too close together to have an order, in bounds on the
-// error of the place (interior_boundary). By a model in single precision of rays past corners of eight blocks: with these none of
-// 11 400 is lost, with 4 instead of 6 up to 12 of 3000, with an order of everything up to 214 of 3000.
+// Where faces are looked for that coincide with one, in bounds on the error of the place (interior_find).
 const float SEARCH_BEFORE = 2.0;
 const float SEARCH_BEYOND = 6.0;
-const float SEARCH_TIE = 0.1;
+// Opaque surfaces that may hide a face for which a ray is sent (interior_ask); more are counted in the ledger.
+const uint ASK_OPAQUE = 32u;
 
 struct Interior {
     uint current;                 // material that fills the space
@@ -107,6 +106,63 @@ Interior interior_cross(Interior i, uvec2 solid, bool is_entered)
     return i;
 }
 
+// Notes the solids that have a face at s and are not settled, and by the last of it whether they hold what is beyond. Returns whether an edge is
+// so near that a ray may pass it on another side; `fits` becomes false where there are too many solids.
+bool interior_find(SurfacePoint s, vec3 d, inout bool fits, inout uint rays)
+{
+    float cosine = max(-dot(s.ng, d), 0.01);
+    float bound = max_component(s.error);
+    float step = bound / cosine;
+    float end = (SEARCH_BEFORE + SEARCH_BEYOND) * step;
+    vec3 origin = s.position + SEARCH_BEYOND * (cosine > MIN_STRAIGHT_COSINE ? step * d : -bound * s.ng);
+    float t_min = 0.0;
+    float edge = s.edge;
+    bool is_shared = false;
+    for (uint k = 0u; k < 2u * SKIP_SIZE && fits; k++) {
+        Hit hit;
+        rays++;
+        if (!trace_closest(origin, -d, t_min, end, NONE, hit)) {
+            break;
+        }
+        SurfaceSide side = surface_side(hit, d);
+        if (side.is_solid) {
+            is_shared = true;
+            edge = min(edge, side.edge);
+            fits = surface_skip_settle(uvec2(side.material, hit.instance), side.is_front);
+        } else {
+            t_min = hit.t;
+        }
+    }
+    return is_shared && edge < end;
+}
+
+// Asks anew which of the solids that are noted hold `origin`, where a ray goes straight on along d: the first face of each that this ray
+// will meet says it, so that what is thought fits what is met. False where too much hides them.
+bool interior_ask(vec3 origin, vec3 d, inout uint rays)
+{
+    surface_skip.is_closed = true;
+    for (uint k = 0u; k < surface_skip.count; k++) {
+        surface_skip.solids[k].x &= ~SKIP_FLAGS;
+    }
+    float t_min = 0.0;
+    bool is_missed = false;
+    for (uint k = 0u; k < SKIP_SIZE + ASK_OPAQUE && !is_missed; k++) {
+        Hit hit;
+        rays++;
+        is_missed = !trace_closest(origin, d, t_min, T_FAR, NONE, hit);
+        if (!is_missed) {
+            SurfaceSide side = surface_side(hit, d);
+            if (side.is_solid) {
+                surface_skip_settle(uvec2(side.material, hit.instance), !side.is_front);
+            } else {
+                t_min = hit.t;
+            }
+        }
+    }
+    surface_skip.is_closed = false;
+    return is_missed;
+}
+
 // The boundary of the solid at s for a ray along d, together with those that coincide
 // with it: between touching solids there is no gap.
 Boundary interior_boundary(Interior here, Hit hit, SurfacePoint s, vec3 d, inout uint rays)
@@ -122,83 +178,22 @@ Boundary interior_boundary(Interior here, Hit hit, SurfacePoint s, vec3 d, inout
     }
     b.before = here.current;
     surface_skip.is_search = true;
-    surface_skip.direction = d;
-    // What lies there is met once more, backwards from a little beyond: of the faces of each solid the last one says whether
-    // the ray is in it afterwards. So it does not matter where a search ends, nor that the next one meets some of them again.
-    // Where the order of a front and a back is not known, a corner or an edge was touched, and the solid stays what it was.
-    float cosine = max(-dot(s.ng, d), 0.01);
-    float bound = max_component(s.error);
-    float step = bound / cosine;
-    vec3 origin = s.position + SEARCH_BEYOND * (cosine > MIN_STRAIGHT_COSINE ? step * d : -bound * s.ng);
-    float at[SKIP_SIZE];
-    uvec2 own = uvec2(s.material, hit.instance);
-    bool fits = true;
-    // At first the face that the ray met is believed. Where two other solids are found an edge is near, which the way back, rounded
-    // anew, may pass on another side: then that face counts only if it is met again.
-    for (uint attempt = 0u; attempt < 2u; attempt++) {
-        surface_skip.count = here.count;
-        for (uint k = 0u; k < here.count; k++) {
-            surface_skip.solids[k] = uvec2(here.entered[k].x | SKIP_HELD | SKIP_HOLDS, here.entered[k].y);
-        }
-        uint others = 0u;
-        float t_min = 0.0;
-        for (uint k = 0u; k < 2u * SKIP_SIZE; k++) {
-            bool is_own = attempt == 0u && k == 0u;
-            uvec2 solid = own;
-            bool is_front = s.is_front;
-            float t = SEARCH_BEYOND * step;
-            if (!is_own) {
-                rays++;
-                if (!trace_closest(origin, -d, t_min, (SEARCH_BEFORE + SEARCH_BEYOND) * step, NONE, hit)) {
-                    break;
-                }
-                SurfaceSide other = surface_side(hit.instance, hit.primitive, d);
-                if (!other.is_solid) {
-                    t_min = hit.t;
-                    continue;
-                }
-                solid = uvec2(other.material, hit.instance);
-                is_front = other.is_front;
-                t = hit.t;
-            }
-            uint slot = surface_skip_slot(solid);
-            fits = slot < SKIP_SIZE;
-            if (!fits) {
-                break;
-            }
-            if (slot == surface_skip.count) {
-                surface_skip.solids[slot] = solid;
-                surface_skip.count++;
-            }
-            uint flags = surface_skip.solids[slot].x & SKIP_FLAGS;
-            bool was_held = (flags & SKIP_HELD) != 0u;
-            bool holds = is_front;
-            if ((flags & SKIP_FOUND) != 0u) {
-                float later = at[slot] - t;
-                holds = abs(later) <= SEARCH_TIE * step ? was_held : (later > 0.0) == is_front;
-                flags |= SKIP_SETTLED;
-            } else {
-                flags |= SKIP_FOUND | (!is_own && is_front == was_held ? SKIP_SETTLED : 0u);
-                at[slot] = t;
-                others += solid == own ? 0u : 1u;
-            }
-            surface_skip.solids[slot].x = solid.x | (flags & ~SKIP_HOLDS) | (holds ? SKIP_HOLDS : 0u);
-        }
-        if (others < 2u) {
-            break;
-        }
+    surface_skip.count = here.count;
+    for (uint k = 0u; k < here.count; k++) {
+        surface_skip.solids[k] = uvec2(here.entered[k].x | SKIP_HOLDS, here.entered[k].y);
+    }
+    bool fits = surface_skip_settle(uvec2(s.material, hit.instance), s.is_front);
+    if (interior_find(s, d, fits, rays)) {
+        fits = interior_ask(s.position + surface_step(s, d), d, rays) && fits;
     }
     b.beyond.count = 0u;
     for (uint k = 0u; k < surface_skip.count; k++) {
-        uvec2 held = surface_skip.solids[k];
-        if ((held.x & SKIP_HOLDS) == 0u) {
-            continue;
-        }
-        if (b.beyond.count < INTERIOR_SIZE) {
-            b.beyond.entered[b.beyond.count] = uvec2(held.x & ~SKIP_FLAGS, held.y);
+        uvec2 solid = surface_skip.solids[k];
+        if ((solid.x & SKIP_HOLDS) != 0u && b.beyond.count < INTERIOR_SIZE) {
+            b.beyond.entered[b.beyond.count] = uvec2(solid.x & ~SKIP_FLAGS, solid.y);
             b.beyond.count++;
         } else {
-            fits = false;
+            fits = fits && (solid.x & SKIP_HOLDS) == 0u;
         }
     }
     interior_overflows += fits ? 0u : 1u;

@@ -42,6 +42,8 @@ layout(constant_id = 22) const uint PARALLELOGRAM_COUNT = 0u;
 layout(constant_id = 23) const uint TRIANGLE_COUNT = 0u;
 layout(constant_id = 24) const uint TEXTURE_KINDS = 0xFFFFFFFFu; // which slots are filled, and with what: TEXTURE_KIND_*
 
+layout(constant_id = 25) const bool HAS_BOXES = false; // the device's structures hold boxes, and shaders test the triangles
+
 // Traversals ask surface_is_opaque of triangles that are marked.
 const bool HAS_CANDIDATES = HAS_ALPHA || HAS_NESTED;
 

@@ -42,6 +42,7 @@ struct SurfacePoint {
     float dielectric_f90;
     uint material;     // its record
     bool is_solid;     // bounds a solid, whose inside is the back; else a transmissive surface is a sheet
+    float edge;        // with HAS_NESTED, metres from the triangle's nearest edge
     float transmission; // share of what is not metal that transmits like a dielectric
     float ior;         // of the solid or the sheet; 0 is infinite
     vec3 strength;     // factor on a dielectric's reflection
@@ -67,6 +68,15 @@ uvec4 surface_triangle(uint instance, uint primitive)
 {
     uint first = HAS_INSTANCES ? scene_instance(instance).first_triangle : 0u;
     return texelFetch(triangles, int(first + primitive));
+}
+
+// Corners in the space of their group.
+void surface_corners(uint instance, uint primitive, out vec3 a, out vec3 b, out vec3 c)
+{
+    uvec4 triangle = surface_triangle(instance, primitive);
+    a = texelFetch(vertices, int(2u * triangle.x)).xyz;
+    b = texelFetch(vertices, int(2u * triangle.y)).xyz;
+    c = texelFetch(vertices, int(2u * triangle.z)).xyz;
 }
 
 // Squares of edges over area up to which a triangle is not thin, and beyond which no more is added.
@@ -176,17 +186,28 @@ vec4 surface_base_color(Material material, uvec4 triangle, vec2 bary)
 struct SurfaceSide {
     uint material;
     bool is_solid;
+    float edge;    // metres from the triangle's nearest edge
     bool is_front; // a ray along d comes from the side that the winding calls front
 };
 
-SurfaceSide surface_side(uint instance, uint primitive, vec3 d)
+// Metres from a place on a triangle to its nearest edge.
+float surface_edge(TriangleShape shape, float doubled_area, vec2 bary)
 {
-    uvec4 triangle = surface_triangle(instance, primitive);
-    TriangleShape shape = surface_shape(instance, triangle);
+    vec3 weights = vec3(1.0 - bary.x - bary.y, bary);
+    vec3 distances = doubled_area * weights / vec3(length(shape.e2 - shape.e1), length(shape.e2), length(shape.e1));
+    return min(distances.x, min(distances.y, distances.z));
+}
+
+SurfaceSide surface_side(Hit hit, vec3 d)
+{
+    uvec4 triangle = surface_triangle(hit.instance, hit.primitive);
+    TriangleShape shape = surface_shape(hit.instance, triangle);
+    vec3 cross_edges = cross(shape.e1, shape.e2);
     SurfaceSide side;
     side.material = triangle.w & TRIANGLE_MATERIAL_MASK;
     side.is_solid = (scene_material(side.material).flags & MATERIAL_SOLID) != 0u;
-    side.is_front = (dot(cross(shape.e1, shape.e2), d) <= 0.0) != shape.is_mirrored;
+    side.is_front = (dot(cross_edges, d) <= 0.0) != shape.is_mirrored;
+    side.edge = surface_edge(shape, length(cross_edges), hit.bary);
     return side;
 }
 
@@ -195,8 +216,10 @@ bool surface_is_skipped(uint instance, uint primitive)
     if (!surface_skip.is_search) {
         return uvec2(instance, primitive) == surface_skip.triangle;
     }
-    SurfaceSide side = surface_side(instance, primitive, surface_skip.direction);
-    return side.is_solid && !surface_skip_asks(uvec2(side.material, instance), side.is_front);
+    uvec4 triangle = surface_triangle(instance, primitive);
+    uint material = triangle.w & TRIANGLE_MATERIAL_MASK;
+    bool is_solid = (scene_material(material).flags & MATERIAL_SOLID) != 0u;
+    return is_solid ? !surface_skip_asks(uvec2(material, instance)) : surface_skip.is_closed;
 }
 
 bool surface_is_opaque(uint instance, uint primitive, vec2 bary)
@@ -311,6 +334,7 @@ SurfacePoint surface_white()
     s.is_solid = false;
     s.transmission = 0.0;
     s.ior = 1.0;
+    s.edge = 0.0;
     s.strength = vec3(1.0);
     return s;
 }
@@ -356,6 +380,7 @@ SurfacePoint surface_point(Hit hit, vec3 wo)
     // Rays that pass faces of touching solids stay on their line (interior.glsl).
     vec2 place = HAS_NESTED ? hit.bary : surface_within(shape, doubled_area, hit.bary);
     s.start = shape.v0 + place.x * shape.e1 + place.y * shape.e2;
+    s.edge = HAS_NESTED ? surface_edge(shape, doubled_area, hit.bary) : 0.0;
     s.error = shape.error;
     s.record = hit.record;
     vec3 front = cross_edges / doubled_area * (shape.is_mirrored ? -1.0 : 1.0);

@@ -6,15 +6,13 @@
 // Solids that are of concern at one place: those that hold it, and those with a face there.
 const uint SKIP_SIZE = 16u;
 // Beside the material of a solid, in bits that materials leave free (TRIANGLE_MATERIAL_MASK).
-const uint SKIP_HELD = 0x80000000u;    // the ray was in it before
-const uint SKIP_HOLDS = 0x40000000u;   // the ray is in it afterwards, as far as is known
-const uint SKIP_FOUND = 0x20000000u;   // a face was found; one of the other side may still change what it says
-const uint SKIP_SETTLED = 0x10000000u; // nothing else is asked of this solid
-const uint SKIP_FLAGS = 0xF0000000u;
+const uint SKIP_HOLDS = 0x80000000u;   // it holds the place that is asked about
+const uint SKIP_SETTLED = 0x40000000u; // nothing else is asked of this solid
+const uint SKIP_FLAGS = 0xC0000000u;
 
 struct SurfaceSkip {
-    bool is_search;          // for faces that coincide, fronts being those that a ray along `direction` enters by
-    vec3 direction;
+    bool is_search;          // for faces of solids that are not settled
+    bool is_closed;          // of those below alone
     uvec2 triangle;          // else (instance, primitive), or NONE
     uint count;              // in a search, of solids: (material and flags, instance)
     uvec2 solids[SKIP_SIZE];
@@ -26,6 +24,7 @@ SurfaceSkip surface_skip;
 void surface_skip_triangle(uvec2 triangle)
 {
     surface_skip.is_search = false;
+    surface_skip.is_closed = false;
     surface_skip.triangle = triangle;
 }
 
@@ -39,12 +38,23 @@ uint surface_skip_slot(uvec2 solid)
     return slot;
 }
 
-// Whether a search asks for a face of the solid.
-bool surface_skip_asks(uvec2 solid, bool is_front)
+// Notes of a solid whether it holds the place, and that no more is asked of it; false where there is no room for another.
+bool surface_skip_settle(uvec2 solid, bool holds)
 {
     uint slot = surface_skip_slot(solid);
-    uint flags = slot < surface_skip.count ? surface_skip.solids[slot].x : 0u;
-    return (flags & SKIP_SETTLED) == 0u && ((flags & SKIP_FOUND) == 0u || ((flags & SKIP_HOLDS) != 0u) != is_front);
+    if (slot == SKIP_SIZE) {
+        return false;
+    }
+    surface_skip.solids[slot] = uvec2(solid.x | SKIP_SETTLED | (holds ? SKIP_HOLDS : 0u), solid.y);
+    surface_skip.count = max(surface_skip.count, slot + 1u);
+    return true;
+}
+
+// Whether a search asks for a face of the solid.
+bool surface_skip_asks(uvec2 solid)
+{
+    uint slot = surface_skip_slot(solid);
+    return slot < surface_skip.count ? (surface_skip.solids[slot].x & SKIP_SETTLED) == 0u : !surface_skip.is_closed;
 }
 
 #endif

@@ -7,8 +7,9 @@
 #include "spec.glsl"
 #include "surface_skip.glsl"
 
-// Words of a search: the number of solids (NONE: no search), the direction, the solids. Scenes without it carry one word.
-const uint PAYLOAD_SOLIDS = 4u;
+// Words of a search: the number of solids and whether it is for them alone (NONE: no search), and the solids. Scenes without it carry one word.
+const uint PAYLOAD_SOLIDS = 1u;
+const uint PAYLOAD_CLOSED = 0x100u;
 const uint PAYLOAD_WORDS = HAS_NESTED ? PAYLOAD_SOLIDS + 2u * SKIP_SIZE : 1u;
 
 struct TracePayload {
@@ -24,11 +25,8 @@ void payload_put(inout TracePayload payload, SurfaceSkip s)
 {
     payload.instance = s.triangle.x;
     payload.primitive = s.triangle.y;
-    payload.skip[0] = s.is_search ? s.count : NONE;
+    payload.skip[0] = s.is_search ? s.count | (s.is_closed ? PAYLOAD_CLOSED : 0u) : NONE;
     if (s.is_search) {
-        for (uint k = 0u; k < 3u; k++) {
-            payload.skip[1u + k] = floatBitsToUint(s.direction[k]);
-        }
         for (uint k = 0u; k < s.count; k++) {
             payload.skip[PAYLOAD_SOLIDS + 2u * k] = s.solids[k].x;
             payload.skip[PAYLOAD_SOLIDS + 2u * k + 1u] = s.solids[k].y;
@@ -40,12 +38,10 @@ SurfaceSkip payload_skip(TracePayload payload)
 {
     SurfaceSkip s;
     s.triangle = uvec2(payload.instance, payload.primitive);
-    s.count = payload.skip[0];
-    s.is_search = s.count != NONE;
+    s.is_search = payload.skip[0] != NONE;
+    s.is_closed = s.is_search && (payload.skip[0] & PAYLOAD_CLOSED) != 0u;
+    s.count = payload.skip[0] & ~PAYLOAD_CLOSED;
     if (s.is_search) {
-        for (uint k = 0u; k < 3u; k++) {
-            s.direction[k] = uintBitsToFloat(payload.skip[1u + k]);
-        }
         for (uint k = 0u; k < s.count; k++) {
             uint at = PAYLOAD_SOLIDS + 2u * k;
             s.solids[k] = uvec2(payload.skip[at], payload.skip[at + 1u]);

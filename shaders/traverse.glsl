@@ -20,6 +20,8 @@ struct Hit {
 
 // Deterministic alpha test; defined in surface.glsl.
 bool surface_is_opaque(uint instance, uint primitive, vec2 bary);
+// Corners in the space of their group; defined in surface.glsl.
+void surface_corners(uint instance, uint primitive, out vec3 a, out vec3 b, out vec3 c);
 
 #include "surface_skip.glsl"
 

@@ -2,20 +2,18 @@
 // with quantised boxes [Ylitie17]. The format is documented in src/bvh/mod.rs;
 // src/bvh/traverse.rs mirrors this file on the host.
 //
-// No gaps: the edge functions of [Woop13] get the same sign (or zero, which counts
-// as inside) in both triangles of an edge, because a vertex is sheared by the same
-// operations in each and every product is rounded once (`precise`). Boxes contain
-// their triangles exactly and are enlarged by more than the rounding of both tests.
+// No gaps: neither between triangles (shear.glsl) nor boxes, which contain their triangles
+// exactly and are enlarged by more than the rounding of both tests.
 //
 // Requires: layout.glsl, spec.glsl, struct Hit, params, instances, surface_is_opaque().
 //
 // [Ylitie17] Ylitie, Karras, Laine: Efficient incoherent ray traversal on GPUs through
 //            compressed wide BVHs. High-Performance Graphics 2017.
-// [Woop13]   Woop, Benthin, Wald: Watertight ray/triangle intersection. Journal of
-//            Computer Graphics Techniques 2(1), 2013.
 
 #ifndef TRAVERSE_SOFTWARE_GLSL
 #define TRAVERSE_SOFTWARE_GLSL
+
+#include "shear.glsl"
 
 #ifdef WGPU
 layout(binding = BIND_BVH_NODES, scalar) readonly buffer BvhNodesBlock { uvec4 bvh_nodes[]; };
@@ -48,9 +46,7 @@ uvec4 bvh_triangle_texel(uint index) { return texelFetch(bvh_triangles, int(inde
 struct BvhRay {
     vec3 origin;
     vec3 inverse;       // of the direction, finite
-    vec3 shear_x;       // rows of the shear that takes the direction to the z axis …
-    vec3 shear_y;
-    vec3 shear_z;       // … and its largest component to one
+    Shear shear;
     bvec3 negative;     // the direction points down
     uint octant;        // flips slots so that higher ones are nearer, in each byte
 };
@@ -63,30 +59,8 @@ BvhRay bvh_ray(vec3 origin, vec3 d) {
     ray.inverse = 1.0 / mix(magnitude, -magnitude, ray.negative);
     ray.octant = (ray.negative.x ? 0u : 0x04040404u) | (ray.negative.y ? 0u : 0x02020202u) |
                  (ray.negative.z ? 0u : 0x01010101u);
-    // Factors 0 and 1 are exact, so that this equals [Woop13] without its permutation of axes.
-    vec3 a = abs(d);
-    if (a.x >= a.y && a.x >= a.z) {
-        ray.shear_x = vec3(-d.y / d.x, 1.0, 0.0);
-        ray.shear_y = vec3(-d.z / d.x, 0.0, 1.0);
-        ray.shear_z = vec3(1.0 / d.x, 0.0, 0.0);
-    } else if (a.y >= a.z) {
-        ray.shear_x = vec3(0.0, -d.z / d.y, 1.0);
-        ray.shear_y = vec3(1.0, -d.x / d.y, 0.0);
-        ray.shear_z = vec3(0.0, 1.0 / d.y, 0.0);
-    } else {
-        ray.shear_x = vec3(1.0, 0.0, -d.x / d.z);
-        ray.shear_y = vec3(0.0, 1.0, -d.y / d.z);
-        ray.shear_z = vec3(0.0, 0.0, 1.0 / d.z);
-    }
+    ray.shear = shear_along(d);
     return ray;
-}
-
-vec3 bvh_shear(BvhRay ray, vec3 vertex) {
-    precise vec3 v = vertex - ray.origin;
-    precise vec3 sheared = v.x * vec3(ray.shear_x.x, ray.shear_y.x, ray.shear_z.x) +
-                           v.y * vec3(ray.shear_x.y, ray.shear_y.y, ray.shear_z.y) +
-                           v.z * vec3(ray.shear_x.z, ray.shear_y.z, ray.shear_z.z);
-    return sheared;
 }
 
 // The four bytes of a word, and the planes that they stand for.
@@ -147,20 +121,6 @@ void bvh_visit(uint index, BvhRay ray, float t_min, float t_max, out uvec2 nodes
     leaves = uvec2(links.y, hits & ~BVH_NODE_BITS);
 }
 
-float bvh_cross(vec3 a, vec3 b) {
-    precise float product = a.x * b.y - a.y * b.x;
-    return product;
-}
-
-// Whether the edge functions have one sign; zero is both. Comparisons, as in bvh_four_hits.
-bool bvh_inside(vec3 edges) {
-    precise float least = edges.x < edges.y ? edges.x : edges.y;
-    least = edges.z < least ? edges.z : least;
-    precise float most = edges.x > edges.y ? edges.x : edges.y;
-    most = edges.z > most ? edges.z : most;
-    return least >= 0.0 || most <= 0.0;
-}
-
 // Edge functions of a triangle of a record as weights of the second and third vertex of the scene's triangle, which
 // the record holds turned.
 vec2 bvh_weights(vec3 edges, float sum, uint turn) {
@@ -168,27 +128,26 @@ vec2 bvh_weights(vec3 edges, float sum, uint turn) {
     return weights / sum;
 }
 
-// Meets a record's triangles, v0 v1 v2 and v0 v2 v3, and takes a hit that is nearer. [Woop13] without its fall-back
-// to double precision, which only reduces the number of rays that hit both triangles of an edge.
+// Meets a record's triangles, v0 v1 v2 and v0 v2 v3, and takes a hit that is nearer.
 bool bvh_intersect(BvhRay ray, uint record, uvec4 v0, uint instance, float t_min, inout Hit hit) {
     uvec4 v1 = bvh_triangle_texel(record + 1u);
     uvec4 v2 = bvh_triangle_texel(record + 2u);
     uvec4 v3 = bvh_triangle_texel(record + 3u);
-    vec3 a = bvh_shear(ray, uintBitsToFloat(v0.xyz));
-    vec3 b = bvh_shear(ray, uintBitsToFloat(v1.xyz));
-    vec3 c = bvh_shear(ray, uintBitsToFloat(v2.xyz));
-    vec3 d = bvh_shear(ray, uintBitsToFloat(v3.xyz));
-    vec3 first = vec3(bvh_cross(c, b), bvh_cross(a, c), bvh_cross(b, a));
+    vec3 a = shear_vertex(ray.shear, ray.origin, uintBitsToFloat(v0.xyz));
+    vec3 b = shear_vertex(ray.shear, ray.origin, uintBitsToFloat(v1.xyz));
+    vec3 c = shear_vertex(ray.shear, ray.origin, uintBitsToFloat(v2.xyz));
+    vec3 d = shear_vertex(ray.shear, ray.origin, uintBitsToFloat(v3.xyz));
+    vec3 first = vec3(shear_cross(c, b), shear_cross(a, c), shear_cross(b, a));
     // The common edge runs the other way, which negates its function exactly.
-    vec3 second = vec3(bvh_cross(d, c), bvh_cross(a, d), -first.y);
+    vec3 second = vec3(shear_cross(d, c), shear_cross(a, d), -first.y);
     float first_sum = first.x + first.y + first.z;
     float second_sum = second.x + second.y + second.z;
     // A mean of the vertices' depths: never beyond the triangle, even where it is seen edge-on.
     float first_t = a.z + (first.y * (b.z - a.z) + first.z * (c.z - a.z)) / first_sum;
     float second_t = a.z + (second.y * (c.z - a.z) + second.z * (d.z - a.z)) / second_sum;
     // Where there is no second triangle v3 equals v0, which makes its sum 0.
-    bool meets_first = bvh_inside(first) && first_sum != 0.0 && first_t > t_min && first_t < hit.t;
-    bool meets_second = bvh_inside(second) && second_sum != 0.0 && second_t > t_min && second_t < hit.t;
+    bool meets_first = shear_inside(first) && first_sum != 0.0 && first_t > t_min && first_t < hit.t;
+    bool meets_second = shear_inside(second) && second_sum != 0.0 && second_t > t_min && second_t < hit.t;
     if (HAS_CANDIDATES) {
         if (meets_first && (v2.w & BVH_FIRST_MASKED) != 0u) {
             vec2 bary = bvh_weights(first, first_sum, v2.w >> BVH_FIRST_TURN & 3u);

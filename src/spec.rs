@@ -58,6 +58,8 @@ pub struct Spec {
     pub triangles: u32,
     /// Which slots of materials are filled, and with what: bits `TEXTURE_KIND_*`.
     pub texture_kinds: u32,
+    /// The device's structures hold boxes, and shaders test the triangles.
+    pub boxes: bool,
 }
 
 /// Features that plain kernels are compiled without (`PLAIN` in `shaders/spec.glsl`): these are half as
@@ -144,6 +146,7 @@ impl Spec {
             parallelograms: self.parallelograms,
             triangles: self.triangles,
             texture_kinds: u32::MAX,
+            boxes: self.boxes,
         }
     }
 
@@ -198,7 +201,7 @@ impl Spec {
                 flags
                     .into_iter()
                     .chain([strategy, self.parallelograms, self.triangles])
-                    .chain([self.texture_kinds]),
+                    .chain([self.texture_kinds, u32::from(self.boxes)]),
             )
             .collect()
     }
@@ -295,4 +298,5 @@ pub(crate) mod kernels {
     pub(crate) const TRACE_MISS: Kernel = kernel!("trace_miss");
     pub(crate) const TRACE_CLOSEST_HIT: Kernel = kernel!("trace_closest_hit");
     pub(crate) const TRACE_ANY_HIT: Kernel = kernel!("trace_any_hit");
+    pub(crate) const TRACE_INTERSECTION: Kernel = kernel!("trace_intersection");
 }

@@ -107,6 +107,7 @@ fn specialisation_constants_are_the_same_in_rust_and_glsl() {
             "PARALLELOGRAM_COUNT",
             "TRIANGLE_COUNT",
             "TEXTURE_KINDS",
+            "HAS_BOXES",
         ]
         .map(String::from),
     );

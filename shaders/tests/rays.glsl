@@ -12,6 +12,14 @@ bool surface_is_opaque(uint instance, uint primitive, vec2 bary) {
     return (primitive & 1u) == 0u;
 }
 
+// The triangles of tests/gpu/rays.rs.
+void surface_corners(uint instance, uint primitive, out vec3 a, out vec3 b, out vec3 c) {
+    float z = -float(primitive);
+    a = vec3(0.0, 0.0, z);
+    b = vec3(1.0, 0.0, z);
+    c = vec3(0.0, 1.0, z);
+}
+
 #ifdef TRAVERSE_PIPELINE
 #include "traverse_pipeline.glsl"
 #else

@@ -1,5 +1,5 @@
 //! Acceleration structures: the scene as rays of the device see it. A [`Blas`] holds the
-//! triangles of one group, a [`Tlas`] places groups in the world. Both are cheap handles.
+//! triangles of one group or boxes around them, a [`Tlas`] places groups in the world. Both are cheap handles.
 
 use std::sync::Arc;
 
@@ -43,7 +43,7 @@ pub struct TlasInstance<'a> {
     pub world_from_object: [[f32; 3]; 4],
 }
 
-/// An acceleration structure over triangles; clones share it.
+/// An acceleration structure over triangles or boxes; clones share it.
 #[derive(Clone)]
 pub struct Blas(Arc<Structure>);
 
@@ -116,23 +116,44 @@ impl Blas {
             .max_vertex(geometry.vertex_count.saturating_sub(1))
             .index_type(vk::IndexType::UINT32)
             .index_data(at(indices.address()));
-        let flags = if geometry.opaque {
-            vk::GeometryFlagsKHR::OPAQUE
-        } else {
-            // Alpha tests need no count of calls: confirming twice changes nothing.
-            vk::GeometryFlagsKHR::empty()
-        };
         let description = vk::AccelerationStructureGeometryKHR::default()
             .geometry_type(vk::GeometryTypeKHR::TRIANGLES)
             .geometry(vk::AccelerationStructureGeometryDataKHR { triangles })
-            .flags(flags);
-        let built = build(
-            device,
-            name,
-            vk::AccelerationStructureTypeKHR::BOTTOM_LEVEL,
-            &description,
-            count as u32,
-        )?;
+            .flags(flags(geometry.opaque));
+        Self::of(device, name, &description, count as u32)
+    }
+
+    /// Builds and compacts a structure over boxes, each a low and a high corner; the position in the slice
+    /// is the primitive's id. What is in a box, the shaders say. Fails as [`Self::build`] does.
+    pub fn build_boxes(
+        device: &Arc<Device>,
+        name: &str,
+        boxes: &[[[f32; 3]; 2]],
+        opaque: bool,
+    ) -> Result<Self> {
+        device.acceleration()?;
+        let count = boxes.len() as u64;
+        check_count(device, name, "boxes", count, device.caps().max_primitives)?;
+        let usage = Usage::ACCELERATION_INPUT;
+        let corners = Buffer::from_slice(device, &format!("{name}: boxes"), usage, boxes)?;
+        let aabbs = vk::AccelerationStructureGeometryAabbsDataKHR::default()
+            .data(at(corners.address()))
+            .stride(size_of::<vk::AabbPositionsKHR>() as u64);
+        let description = vk::AccelerationStructureGeometryKHR::default()
+            .geometry_type(vk::GeometryTypeKHR::AABBS)
+            .geometry(vk::AccelerationStructureGeometryDataKHR { aabbs })
+            .flags(flags(opaque));
+        Self::of(device, name, &description, count as u32)
+    }
+
+    fn of(
+        device: &Arc<Device>,
+        name: &str,
+        geometry: &vk::AccelerationStructureGeometryKHR<'_>,
+        count: u32,
+    ) -> Result<Self> {
+        let kind = vk::AccelerationStructureTypeKHR::BOTTOM_LEVEL;
+        let built = build(device, name, kind, geometry, count)?;
         Ok(Self(Arc::new(compact(built)?)))
     }
 
@@ -202,6 +223,15 @@ impl Tlas {
 
     pub(super) fn is_of(&self, device: &Arc<Device>) -> bool {
         Arc::ptr_eq(&self.0.structure.device, device)
+    }
+}
+
+fn flags(opaque: bool) -> vk::GeometryFlagsKHR {
+    if opaque {
+        vk::GeometryFlagsKHR::OPAQUE
+    } else {
+        // Alpha tests need no count of calls: confirming twice changes nothing.
+        vk::GeometryFlagsKHR::empty()
     }
 }
 

@@ -24,7 +24,8 @@ impl Recipe {
         let mut modules = vec![desc.spirv.to_vec()];
         if let Some(stages) = stages {
             modules.extend([stages.miss.to_vec(), stages.closest_hit.to_vec()]);
-            modules.extend(stages.any_hit.map(<[u32]>::to_vec));
+            let optional = [stages.any_hit, stages.intersection];
+            modules.extend(optional.map(|spirv| spirv.unwrap_or_default().to_vec()));
         }
         Self {
             constants: desc.constants.to_vec(),

@@ -22,11 +22,15 @@ pub struct RayStages<'a> {
     pub closest_hit: &'a [u32],
     /// Asked of each candidate of groups that are not opaque; without it all are there.
     pub any_hit: Option<&'a [u32]>,
+    /// Says what is in the boxes of groups that are built of boxes; with it, rays meet no triangles.
+    pub intersection: Option<&'a [u32]>,
 }
 
 /// The stages that read bindings and push constants.
 const STAGES: vk::ShaderStageFlags = vk::ShaderStageFlags::from_raw(
-    vk::ShaderStageFlags::RAYGEN_KHR.as_raw() | vk::ShaderStageFlags::ANY_HIT_KHR.as_raw(),
+    vk::ShaderStageFlags::RAYGEN_KHR.as_raw()
+        | vk::ShaderStageFlags::ANY_HIT_KHR.as_raw()
+        | vk::ShaderStageFlags::INTERSECTION_KHR.as_raw(),
 );
 
 /// Groups of the pipeline in the order of their records: ray generation, miss, hit.
@@ -73,11 +77,14 @@ fn create(
         (vk::ShaderStageFlags::MISS_KHR, stages.miss),
         (vk::ShaderStageFlags::CLOSEST_HIT_KHR, stages.closest_hit),
     ];
-    sources.extend(
-        stages
-            .any_hit
-            .map(|spirv| (vk::ShaderStageFlags::ANY_HIT_KHR, spirv)),
-    );
+    let optional = [
+        (vk::ShaderStageFlags::ANY_HIT_KHR, stages.any_hit),
+        (vk::ShaderStageFlags::INTERSECTION_KHR, stages.intersection),
+    ];
+    let optional = optional
+        .into_iter()
+        .filter_map(|(stage, spirv)| Some((stage, spirv?)));
+    sources.extend(optional);
     let modules = sources
         .iter()
         .map(|(_, spirv)| Module::new(device, spirv))
@@ -96,12 +103,19 @@ fn create(
         .closest_hit_shader(vk::SHADER_UNUSED_KHR)
         .any_hit_shader(vk::SHADER_UNUSED_KHR)
         .intersection_shader(vk::SHADER_UNUSED_KHR);
-    let mut hit = group
-        .ty(vk::RayTracingShaderGroupTypeKHR::TRIANGLES_HIT_GROUP)
-        .closest_hit_shader(2);
-    if stages.any_hit.is_some() {
-        hit = hit.any_hit_shader(3);
-    }
+    let place = |wanted| {
+        let place = sources.iter().position(|&(stage, _)| stage == wanted);
+        place.map_or(vk::SHADER_UNUSED_KHR, |at| at as u32)
+    };
+    let kind = match stages.intersection {
+        Some(_) => vk::RayTracingShaderGroupTypeKHR::PROCEDURAL_HIT_GROUP,
+        None => vk::RayTracingShaderGroupTypeKHR::TRIANGLES_HIT_GROUP,
+    };
+    let hit = group
+        .ty(kind)
+        .closest_hit_shader(2)
+        .any_hit_shader(place(vk::ShaderStageFlags::ANY_HIT_KHR))
+        .intersection_shader(place(vk::ShaderStageFlags::INTERSECTION_KHR));
     let groups = [group.general_shader(0), group.general_shader(1), hit];
     let info = vk::RayTracingPipelineCreateInfoKHR::default()
         .stages(&entries)

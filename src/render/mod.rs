@@ -3,6 +3,7 @@
 //! sizes, and stopping and going on, do not change a bit of it.
 
 mod backend;
+mod boxes;
 mod emitters;
 mod environment;
 pub mod geometry;

@@ -5,9 +5,10 @@ use std::sync::Arc;
 
 use glam::Vec3;
 
-use super::Study;
+use super::geometry::{Geometry, Group};
 use super::upload::SceneData;
 use super::vulkan::{RECORDS, texel};
+use super::{Study, boxes};
 use crate::bvh::{Bvh, GroupDesc, InstanceDesc, Quality};
 use crate::error::Result;
 use crate::gpu::{
@@ -219,10 +220,12 @@ impl Traversal {
         let any_hit = spec
             .has_candidates()
             .then(|| kernels::TRACE_ANY_HIT.words());
+        let intersection = spec.boxes.then(|| kernels::TRACE_INTERSECTION.words());
         let stages = RayStages {
             miss: &kernels::TRACE_MISS.words(),
             closest_hit: &kernels::TRACE_CLOSEST_HIT.words(),
             any_hit: any_hit.as_deref(),
+            intersection: intersection.as_deref(),
         };
         Pipeline::rays(device, &desc, &stages)
     }
@@ -276,31 +279,29 @@ pub(super) fn upload_bvh(
     })
 }
 
-/// The device's own acceleration structures over `vertices`, two texels each, with their size in bytes.
+/// The device's own acceleration structures, with their size in bytes: over `vertices`, two texels each, or, with
+/// `spec.boxes`, over boxes around triangles.
 pub(super) fn build_scene(
     device: &Arc<Device>,
     data: &SceneData,
+    spec: &Spec,
     vertices: &Buffer,
 ) -> Result<(Tlas, u64)> {
     let geometry = &data.geometry;
+    let slacks = match spec.boxes {
+        true => boxes::slacks(geometry, Vec3::from(data.params.camera_position).as_dvec3()),
+        false => Vec::new(),
+    };
     let mut bytes = 0;
     let mut groups = Vec::with_capacity(geometry.groups.len());
-    for group in &geometry.groups {
-        let triangles: Vec<[u32; 3]> = geometry.triangles[group.triangles.clone()]
-            .iter()
-            .map(|t| [t[0], t[1], t[2]])
-            .collect();
-        let blas = Blas::build(
-            device,
-            "group",
-            &BlasGeometry {
-                vertices,
-                vertex_stride: 32,
-                vertex_count: (geometry.vertices.len() / 2) as u32,
-                triangles: &triangles,
-                opaque: !group.has_cutouts,
-            },
-        )?;
+    for (index, group) in geometry.groups.iter().enumerate() {
+        let blas = match slacks.get(index) {
+            Some(&slack) => {
+                let boxes = boxes::around(geometry, group, slack);
+                Blas::build_boxes(device, "group", &boxes, !group.has_cutouts)?
+            }
+            None => build_group(device, geometry, group, vertices)?,
+        };
         bytes += blas.bytes();
         groups.push(blas);
     }
@@ -316,4 +317,28 @@ pub(super) fn build_scene(
     let scene = Tlas::build(device, "scene", &instances)?;
     bytes += scene.bytes();
     Ok((scene, bytes))
+}
+
+/// A group's triangles.
+fn build_group(
+    device: &Arc<Device>,
+    geometry: &Geometry,
+    group: &Group,
+    vertices: &Buffer,
+) -> Result<Blas> {
+    let triangles: Vec<[u32; 3]> = geometry.triangles[group.triangles.clone()]
+        .iter()
+        .map(|t| [t[0], t[1], t[2]])
+        .collect();
+    Blas::build(
+        device,
+        "group",
+        &BlasGeometry {
+            vertices,
+            vertex_stride: 32,
+            vertex_count: (geometry.vertices.len() / 2) as u32,
+            triangles: &triangles,
+            opaque: !group.has_cutouts,
+        },
+    )
 }

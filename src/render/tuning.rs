@@ -18,6 +18,9 @@ pub struct Tuning {
     pub device_bytes: Option<u64>,
     /// Whether few flat pieces are tested without a walk of our own tree; `None`: on CPUs, where it is faster.
     pub planes: Option<bool>,
+    /// Whether the device's own structures hold boxes, and shaders test the triangles in them; `None`: on CPUs, whose
+    /// own test has gaps at edges.
+    pub boxes: Option<bool>,
     /// Renders by a kernel that is slower and tells more.
     pub study: Study,
 }
@@ -59,6 +62,7 @@ impl Default for Tuning {
             everything: false,
             device_bytes: None,
             planes: None,
+            boxes: None,
             study: Study::None,
         }
     }

@@ -116,7 +116,8 @@ impl VulkanBackend {
                 )?
             }
             None => {
-                let (scene, bytes) = build_scene(device, data, &vertices)?;
+                spec.boxes = tuning.boxes.unwrap_or(is_cpu);
+                let (scene, bytes) = build_scene(device, data, &spec, &vertices)?;
                 match choice {
                     BackendChoice::RayPipeline => Traversal::Pipeline { scene, bytes },
                     _ => Traversal::Query { scene, bytes },

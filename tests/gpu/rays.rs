@@ -25,6 +25,8 @@ macro_rules! module {
 /// Constant of `spec.glsl` that switches candidates on.
 const HAS_ALPHA: u32 = 1;
 const HAS_NESTED: u32 = 13;
+const HAS_INSTANCES: u32 = 9;
+const HAS_BOXES: u32 = 25;
 
 /// Two triangles a group, one behind the other: z = 0 and z = -1, seen from +z.
 /// Vertices have the renderer's stride of 32 bytes.
@@ -37,7 +39,16 @@ const VERTICES: [[f32; 8]; 6] = [
     [0.0, 1.0, -1.0, 9.0, 9.0, 9.0, 9.0, 9.0],
 ];
 
-fn group(device: &Arc<Device>, triangles: &[[u32; 3]], opaque: bool) -> Blas {
+/// Those triangles, or boxes around them.
+fn group(device: &Arc<Device>, triangles: &[[u32; 3]], opaque: bool, boxes: bool) -> Blas {
+    if boxes {
+        let around = |t: &[u32; 3]| {
+            let z = VERTICES[t[0] as usize][2];
+            [[0.0, 0.0, z - 0.25], [1.0, 1.0, z + 0.25]]
+        };
+        let boxes: Vec<_> = triangles.iter().map(around).collect();
+        return Blas::build_boxes(device, "group", &boxes, opaque).unwrap();
+    }
     let vertices =
         Buffer::from_slice(device, "vertices", Usage::ACCELERATION_INPUT, &VERTICES).unwrap();
     let geometry = BlasGeometry {
@@ -58,8 +69,18 @@ const BINDINGS: [(u32, BindingKind); 3] = [
     (BIND_PROBE_HITS, BindingKind::Storage),
 ];
 
+/// Whose rays, and whether they meet boxes in which shaders find the triangles.
+type Way = (Rays, bool);
+
+const WAYS: [Way; 4] = [
+    (Rays::Query, false),
+    (Rays::Query, true),
+    (Rays::Pipeline, false),
+    (Rays::Pipeline, true),
+];
+
 /// The test kernel for the rays of the device, or why there is none.
-fn kernel(device: &Arc<Device>, by: Rays, alpha: bool) -> Result<Pipeline, Error> {
+fn kernel(device: &Arc<Device>, (by, boxes): Way, alpha: bool) -> Result<Pipeline, Error> {
     let desc = PipelineDesc {
         name: "rays",
         spirv: &match by {
@@ -67,17 +88,24 @@ fn kernel(device: &Arc<Device>, by: Rays, alpha: bool) -> Result<Pipeline, Error
             _ => module!("test_rays"),
         },
         bindings: &BINDINGS,
-        constants: &[(HAS_ALPHA, alpha.into()), (HAS_NESTED, 0)],
+        constants: &[
+            (HAS_ALPHA, alpha.into()),
+            (HAS_NESTED, 0),
+            (HAS_INSTANCES, 1),
+            (HAS_BOXES, boxes.into()),
+        ],
         push_bytes: 4,
     };
     if by != Rays::Pipeline {
         return Pipeline::compute(device, &desc);
     }
     let any_hit = module!("test_rays_any_hit");
+    let intersection = module!("test_rays_intersection");
     let stages = RayStages {
         miss: &module!("trace_miss"),
         closest_hit: &module!("trace_closest_hit"),
         any_hit: alpha.then_some(&any_hit),
+        intersection: boxes.then_some(&intersection),
     };
     Pipeline::rays(device, &desc, &stages)
 }
@@ -85,12 +113,12 @@ fn kernel(device: &Arc<Device>, by: Rays, alpha: bool) -> Result<Pipeline, Error
 /// What the rays meet in the scene.
 fn trace(
     device: &Arc<Device>,
-    by: Rays,
+    way: Way,
     scene: &Tlas,
     alpha: bool,
     rays: &[ProbeRay],
 ) -> Vec<ProbeHit> {
-    let pipeline = kernel(device, by, alpha).unwrap();
+    let pipeline = kernel(device, way, alpha).unwrap();
     let bytes = size_of_val(rays) as u64;
     let input = Buffer::from_slice(device, "rays", Usage::STORAGE, rays).unwrap();
     let output = Buffer::new(device, "hits", bytes, Usage::STORAGE, Memory::Readback).unwrap();
@@ -103,7 +131,7 @@ fn trace(
     let push = (rays.len() as u32).to_ne_bytes();
     let groups = [rays.len().div_ceil(GROUP) as u32, 1, 1];
     device
-        .run("rays", |commands| match by {
+        .run("rays", |commands| match way.0 {
             Rays::Pipeline => commands.trace(&pipeline, &set, &push, rays.len() as u32),
             _ => commands.dispatch(&pipeline, &set, &push, groups),
         })
@@ -152,14 +180,16 @@ const TURNED: [[f32; 3]; 4] = [
 
 #[test]
 fn rays_meet_placed_triangles() {
-    for by in [Rays::Query, Rays::Pipeline] {
-        rays_meet_placed_triangles_by(by);
+    for way in WAYS {
+        rays_meet_placed_triangles_by(way);
     }
 }
 
-fn rays_meet_placed_triangles_by(by: Rays) {
-    let Some(device) = open_for(by) else { return };
-    let blas = group(&device, &[[0, 1, 2], [3, 4, 5]], true);
+fn rays_meet_placed_triangles_by(way: Way) {
+    let Some(device) = open_for(way.0) else {
+        return;
+    };
+    let blas = group(&device, &[[0, 1, 2], [3, 4, 5]], true, way.1);
     let place = |world_from_object| TlasInstance {
         blas: &blas,
         world_from_object,
@@ -188,7 +218,7 @@ fn rays_meet_placed_triangles_by(by: Rays) {
         ray([0.25, 0.5, 3.0], down, -1.0),
         ray([0.25, 0.5, 3.0], down, f32::NAN),
     ];
-    let hits = trace(&device, by, &scene, false, &rays);
+    let hits = trace(&device, way, &scene, false, &rays);
     assert_hit(&hits[0], 3.0, [0.25, 0.5], 0, 0);
     assert_hit(&hits[1], 2.0, [0.25, 0.5], 0, 1);
     assert_miss(&hits[2]);
@@ -205,18 +235,20 @@ fn rays_meet_placed_triangles_by(by: Rays) {
 
 #[test]
 fn cut_out_triangles_are_passed() {
-    for by in [Rays::Query, Rays::Pipeline] {
-        cut_out_triangles_by(by);
+    for way in WAYS {
+        cut_out_triangles_by(way);
     }
 }
 
-fn cut_out_triangles_by(by: Rays) {
-    let Some(device) = open_for(by) else { return };
+fn cut_out_triangles_by(way: Way) {
+    let Some(device) = open_for(way.0) else {
+        return;
+    };
     let down = [0.0, 0.0, -1.0];
     let rays = [ray([0.25, 0.5, 3.0], down, 10.0)];
     let up = [ray([0.25, 0.5, -3.0], [0.0, 0.0, 1.0], 10.0)];
     let scene_of = |triangles: &[[u32; 3]], opaque| {
-        let blas = group(&device, triangles, opaque);
+        let blas = group(&device, triangles, opaque, way.1);
         let instance = TlasInstance {
             blas: &blas,
             world_from_object: IDENTITY,
@@ -226,14 +258,14 @@ fn cut_out_triangles_by(by: Rays) {
     let masked = scene_of(&[[0, 1, 2], [3, 4, 5]], false);
     // Primitive 1 lies behind from above, and in front from below, where it is passed.
     assert_hit(
-        &trace(&device, by, &masked, true, &rays)[0],
+        &trace(&device, way, &masked, true, &rays)[0],
         3.0,
         [0.25, 0.5],
         0,
         0,
     );
     assert_hit(
-        &trace(&device, by, &masked, true, &up)[0],
+        &trace(&device, way, &masked, true, &up)[0],
         3.0,
         [0.25, 0.5],
         0,
@@ -241,7 +273,7 @@ fn cut_out_triangles_by(by: Rays) {
     );
     // Without the feature the ray's flag makes everything opaque.
     assert_hit(
-        &trace(&device, by, &masked, false, &up)[0],
+        &trace(&device, way, &masked, false, &up)[0],
         2.0,
         [0.25, 0.5],
         0,
@@ -250,38 +282,43 @@ fn cut_out_triangles_by(by: Rays) {
     // An opaque group is not asked.
     let opaque = scene_of(&[[0, 1, 2], [3, 4, 5]], true);
     assert_hit(
-        &trace(&device, by, &opaque, true, &up)[0],
+        &trace(&device, way, &opaque, true, &up)[0],
         2.0,
         [0.25, 0.5],
         0,
         1,
     );
-    // Nothing is left where every candidate is cut out: primitive 0 is out of the ray's way.
-    let passed = scene_of(&[[0, 0, 0], [3, 4, 5]], false);
-    assert_miss(&trace(&device, by, &passed, true, &rays)[0]);
-    drop((masked, opaque, passed));
+    // Nothing is left where every candidate is cut out: primitive 0 is out of the ray's way. (What is in a box,
+    // the shader says.)
+    if !way.1 {
+        let passed = scene_of(&[[0, 0, 0], [3, 4, 5]], false);
+        assert_miss(&trace(&device, way, &passed, true, &rays)[0]);
+    }
+    drop((masked, opaque));
     finish(device);
 }
 
 #[test]
 fn empty_scenes_are_missed() {
-    for by in [Rays::Query, Rays::Pipeline] {
-        empty_scenes_by(by);
+    for way in WAYS {
+        empty_scenes_by(way);
     }
 }
 
-fn empty_scenes_by(by: Rays) {
-    let Some(device) = open_for(by) else { return };
+fn empty_scenes_by(way: Way) {
+    let Some(device) = open_for(way.0) else {
+        return;
+    };
     let rays = [ray([0.25, 0.5, 3.0], [0.0, 0.0, -1.0], 10.0)];
     let nothing = Tlas::build(&device, "nothing", &[]).unwrap();
-    assert_miss(&trace(&device, by, &nothing, false, &rays)[0]);
-    let blas = group(&device, &[], true);
+    assert_miss(&trace(&device, way, &nothing, false, &rays)[0]);
+    let blas = group(&device, &[], true, way.1);
     let instance = TlasInstance {
         blas: &blas,
         world_from_object: IDENTITY,
     };
     let hollow = Tlas::build(&device, "hollow", &[instance]).unwrap();
-    assert_miss(&trace(&device, by, &hollow, true, &rays)[0]);
+    assert_miss(&trace(&device, way, &hollow, true, &rays)[0]);
     drop((nothing, blas, hollow));
     finish(device);
 }
@@ -289,14 +326,18 @@ fn empty_scenes_by(by: Rays) {
 #[test]
 fn launches_keep_to_what_the_device_was_opened_for() {
     let Some(device) = open(true) else { return };
-    let message = missing_of(kernel(&device, Rays::Pipeline, false).err().unwrap());
+    let message = missing_of(
+        kernel(&device, (Rays::Pipeline, false), false)
+            .err()
+            .unwrap(),
+    );
     assert!(message.contains("opened without"), "{message}");
     finish(device);
 
     let Some(device) = open_for(Rays::Pipeline) else {
         return;
     };
-    let pipeline = kernel(&device, Rays::Pipeline, false).unwrap();
+    let pipeline = kernel(&device, (Rays::Pipeline, false), false).unwrap();
     let scene = Tlas::build(&device, "nothing", &[]).unwrap();
     let buffer = |name| Buffer::new(&device, name, 16, Usage::STORAGE, Memory::Readback).unwrap();
     let (input, output) = (buffer("rays"), buffer("hits"));

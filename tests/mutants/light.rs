@@ -222,6 +222,16 @@ pub const MUTANTS: &[Mutant] = &[
         killers: &["traversal::planes::few_flat_pieces_are_met_as_in_the_tree"],
     },
     Mutant {
+        name: "edge-open",
+        wrong: "what meets an edge of a triangle exactly misses it",
+        file: "shaders/shear.glsl",
+        edits: &[(
+            "return least >= 0.0 || most <= 0.0;",
+            "return least > 0.0 || most < 0.0;",
+        )],
+        killers: &["traversal::watertight::closed_meshes_have_no_gaps"],
+    },
+    Mutant {
         name: "offset-small",
         wrong: "the bound on a hit point's error is 160 times too small",
         file: "shaders/surface.glsl",

@@ -152,6 +152,16 @@ pub const MUTANTS: &[Mutant] = &[
         killers: &["matter::nested::inner_solids_fill_the_space_by_default"],
     },
     Mutant {
+        name: "edge-unasked",
+        wrong: "where solids touch, what a short search says of the faces beside an edge is believed",
+        file: "shaders/interior.glsl",
+        edits: &[(
+            "    if (interior_find(s, d, fits, rays)) {",
+            "    if (interior_find(s, d, fits, rays) && false) {",
+        )],
+        killers: &["stability::numbers::rays_along_edges_know_what_they_are_in"],
+    },
+    Mutant {
         name: "rayleigh-norm",
         wrong: "Rayleigh's phase function without 3/16π",
         file: "shaders/medium.glsl",

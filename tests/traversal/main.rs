@@ -16,6 +16,8 @@ mod backends;
 mod random;
 #[path = "../common/statistics.rs"]
 mod statistics;
+#[path = "../common/tier.rs"]
+mod tier;
 
 mod brute;
 mod furnace;
@@ -47,19 +49,22 @@ enum Levels {
 /// Kernels are compiled once.
 static WORKSHOP: Workshop = Workshop::new();
 
-/// A renderer under validation, or the printed reason why there is none.
-fn open(scene: &Scene, settings: &Settings, levels: Levels) -> Option<Renderer> {
+fn levels_tuning(levels: Levels) -> Tuning {
     let copy_limit = match levels {
         Levels::Flat => usize::MAX,
         Levels::Two => 0,
     };
-    let tuning = Tuning {
+    Tuning {
         copy_limit,
         // The tree is what these tests are about; `planes` shows that small scenes are met alike without it.
         planes: Some(false),
         ..Tuning::default()
-    };
-    open_tuned(scene, settings, tuning)
+    }
+}
+
+/// A renderer under validation, or the printed reason why there is none.
+fn open(scene: &Scene, settings: &Settings, levels: Levels) -> Option<Renderer> {
+    open_tuned(scene, settings, levels_tuning(levels))
 }
 
 /// The same with other details.
@@ -83,14 +88,17 @@ fn open_tuned(scene: &Scene, settings: &Settings, tuning: Tuning) -> Option<Rend
 
 /// A renderer for probes.
 fn prober(scene: &Scene, backend: BackendChoice, levels: Levels) -> Option<Renderer> {
-    let settings = Settings {
+    open(scene, &probing(backend), levels)
+}
+
+fn probing(backend: BackendChoice) -> Settings {
+    Settings {
         width: 8,
         height: 8,
         samples: 0..1,
         backend,
         ..Settings::default()
-    };
-    open(scene, &settings, levels)
+    }
 }
 
 /// The complete film, with the ledger clean.

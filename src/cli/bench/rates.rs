@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use etendue::render::{DeviceOptions, Renderer, devices};
+use etendue::render::{DeviceOptions, Renderer, Tuning, devices};
 use etendue::scene::Scene;
 use etendue::settings::{Estimator, Settings};
 
@@ -42,7 +42,15 @@ pub fn run(
             ..settings.clone()
         };
         let renderer = match support {
-            Ok(()) => Renderer::new(scene, &settings, options).map_err(|e| e.to_string()),
+            // the device's own test of triangles is part of what is measured
+            Ok(()) => {
+                let tuning = Tuning {
+                    boxes: Some(false),
+                    ..Tuning::default()
+                };
+                let renderer = Renderer::tuned(scene, &settings, options, tuning);
+                renderer.map_err(|e| e.to_string())
+            }
             Err(lacks) => Err(format!("the device lacks {lacks}")),
         };
         match renderer {
