@@ -120,6 +120,7 @@ struct Plane {
     uint reserved_2;
 };
 const uint PLANES_MAX = 32u;
+const uint SMALL_TEXELS = 4096u;
 
 // --- Materials ---------------------------------------------------------------
 
@@ -324,5 +325,7 @@ const uint BIND_MEDIA = 16u;         // texel buffer RGBA32UI: Medium[]
 const uint BIND_PROBE_RAYS = 17u;    // storage: ProbeRay[] (probe kernel)
 const uint BIND_PROBE_HITS = 18u;    // storage: ProbeHit[] (probe kernel)
 const uint BIND_PLANES = 19u;        // uniform buffer: Plane[PLANES_MAX] (own BVH)
+const uint BIND_SMALL_NODES = 20u;   // uniform buffer: SMALL_TEXELS of BIND_BVH_NODES, with HAS_SMALL_NODES
+const uint BIND_SMALL_RECORDS = 21u; // uniform buffer: SMALL_TEXELS of BIND_BVH_TRIANGLES, with HAS_SMALL_RECORDS
 
 #endif

@@ -43,6 +43,8 @@ layout(constant_id = 23) const uint TRIANGLE_COUNT = 0u;
 layout(constant_id = 24) const uint TEXTURE_KINDS = 0xFFFFFFFFu; // which slots are filled, and with what: TEXTURE_KIND_*
 
 layout(constant_id = 25) const bool HAS_BOXES = false; // the device's structures hold boxes, and shaders test the triangles
+layout(constant_id = 26) const bool HAS_SMALL_NODES = false;   // of the own tree: all nodes fit a uniform buffer
+layout(constant_id = 27) const bool HAS_SMALL_RECORDS = false; // so do its records
 
 // Traversals ask surface_is_opaque of triangles that are marked.
 const bool HAS_CANDIDATES = HAS_ALPHA || HAS_NESTED;

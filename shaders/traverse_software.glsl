@@ -21,6 +21,8 @@ layout(binding = BIND_BVH_TRIANGLES, scalar) readonly buffer BvhTrianglesBlock {
 #else
 layout(binding = BIND_BVH_NODES) uniform usamplerBuffer bvh_nodes;
 layout(binding = BIND_BVH_TRIANGLES) uniform usamplerBuffer bvh_triangles;
+layout(binding = BIND_SMALL_NODES, scalar) uniform SmallNodesBlock { uvec4 bvh_small_nodes[SMALL_TEXELS]; };
+layout(binding = BIND_SMALL_RECORDS, scalar) uniform SmallRecordsBlock { uvec4 bvh_small_records[SMALL_TEXELS]; };
 #endif
 
 // The builder bounds the depth of both levels so that this is enough.
@@ -39,8 +41,19 @@ const uint BVH_SECOND_TURN = 4u;
 const uint BVH_FLAT = 64u;
 const uint BVH_NODE_RECORDS = 24u; // of a node at most
 
-uvec4 bvh_node_texel(uint index) { return texelFetch(bvh_nodes, int(index)); }
-uvec4 bvh_triangle_texel(uint index) { return texelFetch(bvh_triangles, int(index)); }
+#ifdef WGPU
+uvec4 bvh_node_texel(uint index) { return bvh_nodes[index]; }
+uvec4 bvh_triangle_texel(uint index) { return bvh_triangles[index]; }
+#else
+uvec4 bvh_node_texel(uint index) {
+    if (HAS_SMALL_NODES) return bvh_small_nodes[index];
+    return texelFetch(bvh_nodes, int(index));
+}
+uvec4 bvh_triangle_texel(uint index) {
+    if (HAS_SMALL_RECORDS) return bvh_small_records[index];
+    return texelFetch(bvh_triangles, int(index));
+}
+#endif
 
 // What is computed once for a ray in one space.
 struct BvhRay {

@@ -60,6 +60,10 @@ pub struct Spec {
     pub texture_kinds: u32,
     /// The device's structures hold boxes, and shaders test the triangles.
     pub boxes: bool,
+    /// All nodes of our own tree fit a uniform buffer …
+    pub small_nodes: bool,
+    /// … and so do its records.
+    pub small_records: bool,
 }
 
 /// Features that plain kernels are compiled without (`PLAIN` in `shaders/spec.glsl`): these are half as
@@ -147,6 +151,8 @@ impl Spec {
             triangles: self.triangles,
             texture_kinds: u32::MAX,
             boxes: self.boxes,
+            small_nodes: self.small_nodes,
+            small_records: self.small_records,
         }
     }
 
@@ -201,7 +207,8 @@ impl Spec {
                 flags
                     .into_iter()
                     .chain([strategy, self.parallelograms, self.triangles])
-                    .chain([self.texture_kinds, u32::from(self.boxes)]),
+                    .chain([self.texture_kinds])
+                    .chain([self.boxes, self.small_nodes, self.small_records].map(u32::from)),
             )
             .collect()
     }

@@ -108,6 +108,8 @@ fn specialisation_constants_are_the_same_in_rust_and_glsl() {
             "TRIANGLE_COUNT",
             "TEXTURE_KINDS",
             "HAS_BOXES",
+            "HAS_SMALL_NODES",
+            "HAS_SMALL_RECORDS",
         ]
         .map(String::from),
     );

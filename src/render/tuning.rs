@@ -18,6 +18,8 @@ pub struct Tuning {
     pub device_bytes: Option<u64>,
     /// Whether few flat pieces are tested without a walk of our own tree; `None`: on CPUs, where it is faster.
     pub planes: Option<bool>,
+    /// Whether a small tree of our own lies in uniform buffers; `None`: on CPUs, which read them faster.
+    pub small: Option<bool>,
     /// Whether the device's own structures hold boxes, and shaders test the triangles in them; `None`: on CPUs, whose
     /// own test has gaps at edges.
     pub boxes: Option<bool>,
@@ -62,6 +64,7 @@ impl Default for Tuning {
             everything: false,
             device_bytes: None,
             planes: None,
+            small: None,
             boxes: None,
             study: Study::None,
         }

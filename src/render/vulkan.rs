@@ -6,7 +6,9 @@ use std::sync::Arc;
 use super::backend::{Backend, Batch, Frame, film_bytes, film_floats, read_ledger, workers};
 use super::planes::Planes;
 use super::room;
-use super::traversal::{GROUP, Traversal, build_scene, note_roots, own_tree, upload_bvh};
+use super::traversal::{
+    GROUP, Traversal, build_scene, note_roots, note_small, own_tree, upload_bvh,
+};
 use super::upload::SceneData;
 use super::{DeviceOptions, Ledger, Memory, TraversalCounts, Tuning, Workshop};
 use crate::error::{Error, Result};
@@ -109,11 +111,11 @@ impl VulkanBackend {
                 if let Some(planes) = &planes {
                     planes.note(&mut spec, &mut params);
                 }
-                upload_bvh(
-                    device,
-                    &bvh,
-                    planes.as_ref().map_or(&[], |planes| &planes.list),
-                )?
+                if tuning.small.unwrap_or(is_cpu) {
+                    note_small(&bvh, &mut spec);
+                }
+                let list = planes.as_ref().map_or(&[][..], |planes| &planes.list);
+                upload_bvh(device, &bvh, list, &spec)?
             }
             None => {
                 spec.boxes = tuning.boxes.unwrap_or(is_cpu);

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 
 use etendue::film::Film;
 use etendue::layout::{NONE, ProbeHit, ProbeRay};
+use etendue::render::Tuning;
 use etendue::scene::{Camera, Projection, Scene, gltf};
 use etendue::settings::{BackendChoice, Settings};
 use glam::DVec3;
@@ -12,7 +13,7 @@ use glam::DVec3;
 use crate::backends::offered;
 use crate::brute::{Brute, T_TOLERANCE, check, origin};
 use crate::statistics::largest_of;
-use crate::{Levels, finish, open, render};
+use crate::{Levels, finish, levels_tuning, open, open_tuned, render};
 
 const WIDTH: u32 = 64;
 const HEIGHT: u32 = 48;
@@ -223,5 +224,40 @@ fn backends_agree_on_the_scenes() {
         if compare(&path).is_none() {
             return;
         }
+    }
+}
+
+/// Where a small tree lies changes no bit: scenes with nodes and records, and with nodes alone, in uniform buffers.
+#[test]
+fn small_trees_are_read_alike_from_both_places() {
+    for (name, triangles) in [("glass", 1362), ("caustic", 3068)] {
+        let file = Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("scenes/{name}.gltf"));
+        let scene = gltf::load(&file).unwrap();
+        let held: usize = scene.meshes.iter().map(|m| m.triangles.len()).sum();
+        assert!(
+            held <= triangles,
+            "{name} has grown: is its tree still small?"
+        );
+        let settings = Settings {
+            width: 32,
+            height: 32,
+            samples: 0..8,
+            backend: BackendChoice::Bvh,
+            ..Settings::default()
+        };
+        let film = |small| {
+            let tuning = Tuning {
+                small: Some(small),
+                ..levels_tuning(Levels::Flat)
+            };
+            let mut renderer = open_tuned(&scene, &settings, tuning)?;
+            let film = render(&mut renderer);
+            finish(&renderer);
+            Some(film)
+        };
+        let (Some(uniform), Some(texels)) = (film(true), film(false)) else {
+            return;
+        };
+        assert!(uniform.mean() == texels.mean(), "{name}");
     }
 }
