@@ -297,8 +297,8 @@ pub(super) fn upload_bvh(
 
 /// Bytes of a uniform buffer of a small tree's texels.
 const SMALL_BYTES: usize = 16 * layout::SMALL_TEXELS as usize;
-/// Most bytes of nodes that go there: 31 KB are read 1.07 to 1.25 times as fast, 60 KB 0.9 times.
-const SMALL_NODE_BYTES: usize = 48 << 10;
+/// Most bytes of nodes that go there: with 14 to 24 KB renders are 1.07 to 1.25 times as fast, with 29 KB 1.05, with 37 KB 0.9.
+const SMALL_NODE_BYTES: usize = 32 << 10;
 
 /// Notes what of our own tree goes to uniform buffers.
 pub(super) fn note_small(bvh: &Bvh, spec: &mut Spec) {
