@@ -120,7 +120,7 @@ struct Plane {
     uint reserved_2;
 };
 const uint PLANES_MAX = 32u;
-const uint SMALL_TEXELS = 4096u;
+const uint SMALL_TEXELS = 4096u; // of a uniform buffer of 64 KiB
 
 // --- Materials ---------------------------------------------------------------
 
