@@ -13,7 +13,7 @@ use glam::DVec3;
 use crate::backends::offered;
 use crate::brute::{Brute, T_TOLERANCE, check, origin};
 use crate::statistics::largest_of;
-use crate::{Levels, finish, levels_tuning, open, open_tuned, render};
+use crate::{Levels, finish, levels_tuning, open, open_tuned, probing, render};
 
 const WIDTH: u32 = 64;
 const HEIGHT: u32 = 48;
@@ -242,8 +242,7 @@ fn small_trees_are_read_alike_from_both_places() {
             width: 32,
             height: 32,
             samples: 0..8,
-            backend: BackendChoice::Bvh,
-            ..Settings::default()
+            ..probing(BackendChoice::Bvh)
         };
         let film = |small| {
             let tuning = Tuning {

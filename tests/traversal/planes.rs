@@ -3,11 +3,11 @@
 use etendue::layout::{NONE, ProbeHit, ProbeRay};
 use etendue::render::Tuning;
 use etendue::scene::{Mesh, Scene};
-use etendue::settings::{BackendChoice, Settings};
+use etendue::settings::BackendChoice;
 use glam::{DAffine3, DQuat, DVec3, Vec3};
 
 use crate::scenes::{Random, cube, lambert, mesh, scaled, scene};
-use crate::{finish, open_tuned};
+use crate::{finish, open_tuned, probing};
 
 const RAYS: usize = 40_000;
 /// Half widths of the rooms, metres: powers of two, which round nothing.
@@ -15,19 +15,12 @@ const SIZES: [f64; 5] = [1.0, 1.0, 1.0 / 1_048_576.0, 1_048_576.0, 8.0];
 
 /// What the rays meet, with the pieces tested or by the walk alone.
 fn probe(scene: &Scene, planes: bool, rays: &[ProbeRay]) -> Option<Vec<ProbeHit>> {
-    let settings = Settings {
-        width: 8,
-        height: 8,
-        samples: 0..1,
-        backend: BackendChoice::Bvh,
-        ..Settings::default()
-    };
     let tuning = Tuning {
         planes: Some(planes),
         copy_limit: usize::MAX,
         ..Tuning::default()
     };
-    let renderer = open_tuned(scene, &settings, tuning)?;
+    let renderer = open_tuned(scene, &probing(BackendChoice::Bvh), tuning)?;
     let features = renderer.report().features;
     assert!(
         features
