@@ -25,15 +25,15 @@ struct FilmNode {
     float dropped;   // samples
 };
 
-// Two siblings of `count` samples each, the earlier one first.
-FilmNode film_merge(FilmNode a, FilmNode b, float count)
+// Two siblings of `count` samples each, the earlier one first; whether each is one block.
+FilmNode film_merge(FilmNode a, FilmNode b, float count, bool are_blocks)
 {
     FilmNode r;
     precise vec3 sum = a.sum + b.sum;
     precise vec3 d = a.sum - b.sum;
     precise vec3 within = a.m2 + b.m2;
     // Samples of a block are not independent: what counts is how blocks differ.
-    if (HAS_STRATA && count == float(1u << BLOCK_LEVEL)) {
+    if (are_blocks) {
         within = vec3(0.0);
     }
     precise vec3 m2 = within + (d * d) * (1.0 / (2.0 * count));

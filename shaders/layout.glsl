@@ -300,8 +300,9 @@ const uint LEDGER_LANES_LOW = 13u;
 const uint LEDGER_SIZE = 15u;
 
 const uint TILE = 8u;
-// log₂ of the samples of a block, with HAS_STRATA.
+// log₂ of the samples of the first blocks, and of the largest, with HAS_STRATA; see rng_block_level.
 const uint BLOCK_LEVEL = 4u;
+const uint MAX_BLOCK_LEVEL = 8u;
 
 // --- Bindings: one descriptor set ---------------------------------------------------
 

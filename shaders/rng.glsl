@@ -2,9 +2,9 @@
 // slot). Dimensions are named, so that switching a feature off shifts none of
 // the others, and any sample can be computed alone.
 //
-// With HAS_STRATA the samples of an aligned block of 2^BLOCK_LEVEL are one
-// net in the four numbers of each slot, scrambled after Owen: every block has scrambles of
-// its own, so that blocks are independent and their spread gives the standard error.
+// With HAS_STRATA the samples of a block are one net in the four numbers of each slot,
+// scrambled after Owen: every block has scrambles of its own, so that blocks are
+// independent and their spread gives the standard error. Later blocks are larger, up to 256 samples, and err less.
 //
 // [Jarzynski20] Jarzynski, Olano, Hash Functions for GPU Rendering, JCGT 9(3): pcg4d.
 // [Owen97] Owen, Scrambled Net Variance for Integrals of Smooth Functions.
@@ -40,6 +40,14 @@ uvec4 rng_pcg4d(uvec4 v)
     return v;
 }
 
+// log₂ of the samples of the aligned block that holds a sample: two blocks of a size, four of the first, then two of the
+// next, so that the samples so far are always some blocks that tell the error (`Film`).
+uint rng_block_level(uint sample_low, uint sample_high)
+{
+    int level = findMSB(sample_low) - 1;
+    return sample_high != 0u ? MAX_BLOCK_LEVEL : uint(clamp(level, int(BLOCK_LEVEL), int(MAX_BLOCK_LEVEL)));
+}
+
 // Key of one pixel sample. `pixel` counts in the full frame, so that crops and
 // shards see the same numbers. The first round spreads the seed and the high
 // half of the sample index over all words. With HAS_STRATA the last word is the
@@ -50,8 +58,10 @@ uvec4 rng_key(uvec2 seed, uint pixel, uint sample_low, uint sample_high)
     if (!HAS_STRATA) {
         return rng_pcg4d(base ^ uvec4(pixel, sample_low, 0u, 0u));
     }
-    uvec3 block = rng_pcg4d(base ^ uvec4(pixel, sample_low >> BLOCK_LEVEL, 0u, 0u)).xyz;
-    return uvec4(block, bitfieldExtract(sample_low, 0, int(BLOCK_LEVEL)));
+    uint level = rng_block_level(sample_low, sample_high);
+    uint place = bitfieldExtract(sample_low, 0, int(level));
+    uvec3 block = rng_pcg4d(base ^ uvec4(pixel, sample_low - place, 0u, 0u)).xyz;
+    return uvec4(block, place);
 }
 
 // A nested permutation of the binary digits after the point, chosen by two words for
@@ -66,28 +76,34 @@ uvec4 rng_owen(uvec4 v, uvec4 add, uvec4 factor)
     return bitfieldReverse(v);
 }
 
-// A permutation of the places in a block, chosen by a word: steps that carry from
-// low digits to high ones, and digits reversed between them, so that no digit leads.
+// A permutation of the places in a block, chosen by a word, that keeps each run of the first 2^k places together, k ≥ BLOCK_LEVEL,
+// so that they stay a net. The low digits go through steps that carry from low digits
+// to high ones, and are reversed between them, so that no digit leads; each group of 16 has another order.
 uint rng_shuffle(uint place, uint word)
 {
+    uint low = bitfieldExtract(place, 0, int(BLOCK_LEVEL));
+    uint group = place - low;
+    word = (word ^ group) * 0x9E3779B1u;
+    word ^= word >> 15u;
     for (uint k = 0u; k < 3u; k++) {
-        place = place * (word >> 3u | 1u) + word;
-        place = bitfieldReverse(place) >> (32u - BLOCK_LEVEL);
+        low = low * (word >> 3u | 1u) + word;
+        low = bitfieldReverse(low) >> (32u - BLOCK_LEVEL);
         word >>= 8u;
     }
-    return place;
+    return group | low;
 }
 
-// Point of the four-dimensional net of a block. x, y, z are place / size and Sobol's first two
-// numbers: a (0, m, 3)-net, whose cells of any shape hold one point each [Owen97]. No
-// fourth number does that with all of them; of those that miss least, w is one (t = 1), found by search.
-// The first digit after the point is the lowest bit.
+// Point of a four-dimensional digital sequence, of which each aligned run of 2^m places, m ≥ BLOCK_LEVEL, is a net [Owen97]. y and z are
+// Sobol's first two numbers: cells of any shape in their plane hold one point each. x and w were found by search: alone
+// they have one point in each of 2^m intervals, and the other planes lack a digit at most (x with w two at 256). 16 places are a (1, 4, 4)-net
+// and, without w, a (0, 4, 3)-net. The first digit after the point is the lowest bit.
 uvec4 rng_net(uint place)
 {
-    const uvec4 columns[BLOCK_LEVEL] = uvec4[](uvec4(8u, 1u, 1u, 1u), uvec4(4u, 2u, 3u, 4u), uvec4(2u, 4u, 5u, 3u),
-                                               uvec4(1u, 8u, 15u, 13u));
+    const uvec4 columns[MAX_BLOCK_LEVEL] = uvec4[](
+        uvec4(88u, 1u, 1u, 241u), uvec4(100u, 2u, 3u, 244u), uvec4(242u, 4u, 5u, 211u), uvec4(17u, 8u, 15u, 45u),
+        uvec4(158u, 16u, 17u, 172u), uvec4(211u, 32u, 51u, 71u), uvec4(185u, 64u, 85u, 9u), uvec4(132u, 128u, 255u, 92u));
     uvec4 v = uvec4(0u);
-    for (uint k = 0u; k < BLOCK_LEVEL; k++) {
+    for (uint k = 0u; k < MAX_BLOCK_LEVEL; k++) {
         v ^= columns[k] * (place >> k & 1u);
     }
     return v;
@@ -102,7 +118,8 @@ vec4 rng_uniform(uvec4 key, uint event, uint slot)
     if (HAS_STRATA) {
         uvec4 words = rng_pcg4d(uvec4(key.xy, key.z ^ dimension, 0x85EBCA6Bu));
         // Slots see the block in orders of their own, so that they do not go together.
-        bits = rng_owen(rng_net(rng_shuffle(key.w, words.x ^ words.z)), words, words.yzwx);
+        uint place = rng_shuffle(key.w, words.x ^ words.z) ^ (words.y ^ words.w) >> 24u & 0xF0u;
+        bits = rng_owen(rng_net(place), words, words.yzwx);
     } else {
         bits = rng_pcg4d(key ^ uvec4(0u, 0u, dimension, 0x85EBCA6Bu));
     }

@@ -16,7 +16,7 @@ use std::collections::BTreeMap;
 use std::ops::Range;
 
 use crate::error::{Error, Result};
-use crate::layout::{FILM_FLOATS, FILM_FLOATS_AOV};
+use crate::layout::{FILM_FLOATS, FILM_FLOATS_AOV, MAX_BLOCK_LEVEL};
 use crate::settings::{Crop, Settings};
 
 /// One past the largest sample index, so that ends and node sizes fit 64 bits.
@@ -42,7 +42,7 @@ pub struct Film {
     window: Crop,
     full: (u32, u32),
     aovs: bool,
-    /// log₂ of the samples that depend on each other.
+    /// log₂ of the samples of the first blocks, whose samples depend on each other; 0: of none.
     block_level: u32,
     /// By first sample; disjoint, and no two siblings of the same level.
     nodes: BTreeMap<u64, Node>,
@@ -58,6 +58,16 @@ pub fn dyadic_pieces(samples: Range<u64>) -> Vec<(u64, u32)> {
         first += 1 << level;
     }
     pieces
+}
+
+/// log₂ of the samples of the block that holds a sample, where the first blocks have 2^`first` samples: there are four of
+/// these, then come two of each double size up to 2⁸ (`rng_block_level` in rng.glsl). 0: samples are independent.
+pub(crate) fn block_of(first: u32, sample: u64) -> u32 {
+    if first == 0 {
+        return 0;
+    }
+    let doubled = sample.max(1).ilog2().saturating_sub(1);
+    doubled.clamp(first, MAX_BLOCK_LEVEL.max(first))
 }
 
 impl Film {
@@ -79,18 +89,36 @@ impl Film {
         Self::new(settings.window(), full, settings.aovs).with_blocks(settings.block_level())
     }
 
-    /// An empty film whose samples are independent only from one aligned block of
-    /// 2^`level` to the next, as those of a scrambled net: from two whole blocks on
-    /// the standard error comes from how they differ.
+    /// An empty film whose samples are independent only from one aligned block to the next, as
+    /// those of scrambled nets, where the first four have 2^`level` samples and later ones more: from
+    /// two whole blocks on the standard error comes from how they differ.
     #[must_use]
     pub fn with_blocks(mut self, level: u32) -> Self {
         self.block_level = level;
         self
     }
 
-    /// log₂ of the samples that depend on each other.
+    /// log₂ of the samples of the first blocks; 0 where samples are independent.
     pub fn block_level(&self) -> u32 {
         self.block_level
+    }
+
+    /// log₂ of the samples of the block that holds a sample.
+    fn block_of(&self, sample: u64) -> u32 {
+        block_of(self.block_level, sample)
+    }
+
+    /// Number of whole blocks in a node; 0 where it is a part of one.
+    fn whole_blocks(&self, first: u64, level: u32) -> u64 {
+        let block = self.block_of(first);
+        if level < block {
+            0
+        } else if first > 0 || level == block {
+            // All of one size, since sizes change at powers of two.
+            1 << (level - block)
+        } else {
+            self.whole_blocks(0, level - 1) + self.whole_blocks(1 << (level - 1), level - 1)
+        }
     }
 
     /// Number of parts that the standard error takes as independent, one more than
@@ -100,17 +128,17 @@ impl Film {
         if !self.has_blocks() {
             return self.samples();
         }
-        let levels = self.nodes.values().map(|node| node.level);
-        levels
-            .map(|level| 1_u64 << level.saturating_sub(self.block_level))
+        let nodes = self.nodes.iter();
+        nodes
+            .map(|(&first, node)| self.whole_blocks(first, node.level).max(1))
             .sum()
     }
 
     /// Whether there are two blocks to compare.
     fn has_blocks(&self) -> bool {
-        let levels = self.nodes.values().map(|node| node.level);
-        let above = levels.filter_map(|level| level.checked_sub(self.block_level));
-        above.map(|level| 1_u64 << level).sum::<u64>() >= 2
+        let nodes = self.nodes.iter();
+        let blocks = nodes.map(|(&first, node)| self.whole_blocks(first, node.level));
+        blocks.sum::<u64>() >= 2
     }
 
     /// The pixels that the film holds.
@@ -372,7 +400,7 @@ impl Film {
             } else {
                 (values, other)
             };
-            let are_blocks = level == self.block_level;
+            let are_blocks = level == self.block_of(first.max(sibling));
             merge_siblings(&mut values, &right, level, stride, are_blocks);
             first = first.min(sibling);
             level += 1;
@@ -406,10 +434,10 @@ impl Film {
         let start = pixel * self.floats_per_pixel();
         let (mut n, mut mean, mut m2) = (0.0, [0.0; 3], [0.0; 3]);
         let has_blocks = self.has_blocks();
-        for node in self.nodes.values() {
+        for (&first, node) in &self.nodes {
             let count = (1_u64 << node.level) as f64;
             // Deviations within a block say nothing about how blocks differ.
-            let counts = !has_blocks || node.level > self.block_level;
+            let counts = !has_blocks || node.level > self.block_of(first);
             for channel in 0..3 {
                 let sum = f64::from(node.values[start + RADIANCE + channel]);
                 let own = f64::from(node.values[start + DEVIATIONS + channel]);

@@ -268,6 +268,7 @@ tags! {
     LEDGER_SIZE = 15;
     TILE = 8;
     BLOCK_LEVEL = 4;
+    MAX_BLOCK_LEVEL = 8;
     BIND_PARAMS = 0;
     BIND_FILM = 1;
     BIND_LEDGER = 2;

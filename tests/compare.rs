@@ -84,7 +84,7 @@ fn drawn(random: &mut Random, law: Law, side: usize, n: u64) -> Side {
         variance: Some(variance),
         source: Some(Source::StandardError),
         count: Some(vec![n as f64; side * side]),
-        block: 1.0,
+        parts: None,
         rounding: 0.0,
         notes: Vec::new(),
     }
@@ -105,10 +105,10 @@ fn alarms_are_as_rare_as_they_should_be_for_any_law() {
     }
 }
 
-/// Renders parts of one long render: different samples are as independent as different seeds.
+/// Renders with a new seed each time.
 struct Samples {
     renderer: Renderer,
-    next: u64,
+    seed: u64,
 }
 
 impl Samples {
@@ -121,7 +121,7 @@ impl Samples {
         };
         let required = std::env::var_os("ETENDUE_REQUIRE_DEVICE").is_some();
         match Renderer::new(scene, &settings, &DeviceOptions::default()) {
-            Ok(renderer) => Some(Self { renderer, next: 0 }),
+            Ok(renderer) => Some(Self { renderer, seed: 0 }),
             Err(error @ Error::Unsupported { .. }) if !required => {
                 println!("skipped: {error}");
                 None
@@ -131,10 +131,8 @@ impl Samples {
     }
 
     fn image(&mut self, samples: u64) -> Image {
-        self.next = self.next.next_multiple_of(samples);
-        let range = self.next..self.next + samples;
-        self.renderer.restart(range, 0).unwrap();
-        self.next += samples;
+        self.seed += 1;
+        self.renderer.restart(0..samples, self.seed).unwrap();
         let film = self.renderer.render(&mut |_| Control::Continue).unwrap();
         Image::from_film(&film, &[Aov::StandardError, Aov::Samples], Metadata::new()).unwrap()
     }

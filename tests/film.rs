@@ -322,7 +322,7 @@ fn pieces_are_aligned_and_make_up_the_range() {
     }
 }
 
-/// Leaves of a film whose blocks have 2^`level` samples.
+/// Leaves of a film whose first blocks have 2^`level` samples.
 fn blocks(samples: Range<u64>, level: u32) -> Film {
     let mut film = film(false).with_blocks(level);
     for sample in samples {
@@ -348,10 +348,28 @@ fn expected_error(parts: &[Range<u64>], float: u64) -> f64 {
 #[test]
 fn blocks_decide_the_standard_error() {
     let singles = |samples: Range<u64>| samples.map(|s| s..s + 1).collect::<Vec<_>>();
-    let cases: [(Range<u64>, Vec<Range<u64>>); 4] = [
+    let of =
+        |size: u64, samples: Range<u64>| samples.step_by(size as usize).map(move |s| s..s + size);
+    let cases: [(Range<u64>, Vec<Range<u64>>); 7] = [
+        // four of the first size, two of each of the next
+        (
+            0..64,
+            of(4, 0..16)
+                .chain(of(8, 16..32))
+                .chain(of(16, 32..64))
+                .collect(),
+        ),
+        (16..48, vec![16..24, 24..32, 32..48]),
+        // none is larger than 256
+        (1024..2048, of(256, 1024..2048).collect()),
         // whole blocks, with a rest of two nodes
-        (0..64, (0..16).map(|b| 4 * b..4 * b + 4).collect()),
         (0..11, vec![0..4, 4..8, 8..10, 10..11]),
+        (
+            0..39,
+            of(4, 0..16)
+                .chain([16..24, 24..32, 32..36, 36..38, 38..39])
+                .collect(),
+        ),
         (3..16, vec![3..4, 4..8, 8..12, 12..16]),
         // a single block: its samples
         (4..11, singles(4..11)),

@@ -1,5 +1,7 @@
 //! What a file says about its image: means, squared standard errors, sample counts.
 
+use std::ops::Range;
+
 use crate::error::{Error, Result};
 use crate::image_io::{Image, Value};
 
@@ -42,8 +44,8 @@ pub struct Side {
     pub source: Option<Source>,
     /// Samples of each pixel.
     pub count: Option<Vec<f64>>,
-    /// Samples that depend on each other, as the points of one net.
-    pub block: f64,
+    /// Independent parts that the variance was estimated from, where the file tells; else samples are.
+    pub parts: Option<f64>,
     /// Relative size of differences that are rounding.
     pub rounding: f64,
     /// What the user should know.
@@ -74,7 +76,7 @@ impl Side {
             notes: Vec::new(),
             mean,
             count,
-            block: (1_u64 << image.block_level()) as f64,
+            parts: image.parts(),
         };
         side.find_variance(image);
         Ok(side)
@@ -135,8 +137,7 @@ impl Side {
     /// Independent parts that the variance of a pixel was estimated from.
     pub fn parts(&self, pixel: usize) -> Option<f64> {
         let count = self.count.as_ref()?[pixel];
-        let blocks = (count / self.block).floor();
-        Some(if blocks < 2.0 { count } else { blocks })
+        Some(self.parts.unwrap_or(count))
     }
 
     /// Whether a pixel is finite in all channels.
@@ -205,21 +206,22 @@ pub fn shared_samples(a: &Image, b: &Image) -> Option<String> {
             return None;
         }
     }
-    let ranges = |image: &Image| -> Option<Vec<(u64, u64)>> {
+    // Samples of one net are not independent, even if none is in both.
+    let nets = |image: &Image| -> Option<Vec<Range<u64>>> {
         let list = text(image, "samples")?;
-        let range = |r: &str| {
+        let nets = |r: &str| {
             let (start, end) = r.split_once("..")?;
-            Some((start.parse().ok()?, end.parse().ok()?))
+            Some(image.blocks_around(start.parse().ok()?..end.parse().ok()?))
         };
-        list.split(',').map(range).collect()
+        list.split(',').map(nets).collect()
     };
-    let (ours, theirs) = (ranges(a)?, ranges(b)?);
-    let overlaps = |&(s, e): &(u64, u64)| theirs.iter().any(|&(t, f)| s < f && t < e);
+    let (ours, theirs) = (nets(a)?, nets(b)?);
+    let overlaps = |o: &Range<u64>| theirs.iter().any(|t| o.start < t.end && t.start < o.end);
     let seed = text(a, "settings.seed")?;
     ours.iter().any(overlaps).then(|| {
         format!(
-            "both images have samples of seed {seed} in common: they are not independent, agree better than chance \
-             alone would let them, and small differences stay hidden; render one of them with another --seed"
+            "both images have samples of seed {seed} in common, or parts of the same nets: they are not independent and agree \
+             better or worse than chance alone would let them; render one of them with another --seed"
         )
     })
 }

@@ -138,13 +138,14 @@ impl Aov {
 }
 
 impl Image {
-    /// The mean of a film and the layers asked for that it has; [`Self::BLOCK`] is added to the header.
+    /// The mean of a film and the layers asked for that it has; [`Self::BLOCK`] and [`Self::PARTS`] are added to the header.
     ///
     /// # Errors
     /// [`Error::Settings`] when a layer needs sums of the first hit that the film does not have.
     pub fn from_film(film: &Film, aovs: &[Aov], mut metadata: Metadata) -> Result<Self> {
         let block = (1_u64 << film.block_level()) as f64;
         metadata.insert(Self::BLOCK.to_owned(), block.into());
+        metadata.insert(Self::PARTS.to_owned(), (film.parts() as f64).into());
         let mut channels = Vec::new();
         push_vectors(
             &mut channels,

@@ -1,8 +1,10 @@
 //! Films in images: a mean is rounded, so images that are to be merged carry the
 //! sums themselves, a layer `node.FIRST.LEVEL` for each node of the film.
 
+use std::ops::Range;
+
 use super::{Channel, Image, Value};
-use crate::film::Film;
+use crate::film::{Film, block_of};
 
 /// Before the names of the layers.
 const PREFIX: &str = "node.";
@@ -27,8 +29,10 @@ const PARTS: [&str; 15] = [
 ];
 
 impl Image {
-    /// Entry of the header: number of samples that depend on each other, a power of two.
+    /// Entry of the header: number of samples of the first blocks, whose samples depend on each other, a power of two.
     pub const BLOCK: &'static str = "stderr.block";
+    /// Entry of the header: number of independent parts that standard errors come from.
+    pub const PARTS: &'static str = "stderr.parts";
 
     /// Adds the nodes of the film that the image was made of.
     pub fn push_nodes(&mut self, film: &Film) {
@@ -79,11 +83,26 @@ impl Image {
         Ok(film)
     }
 
-    /// log₂ of the samples that depend on each other, as the header tells; 0 where it does not.
+    /// log₂ of the samples of the first blocks, as the header tells; 0 where it does not.
     pub fn block_level(&self) -> u32 {
         match self.metadata.get(Self::BLOCK) {
             Some(Value::Number(count)) if *count >= 1.0 => (*count as u64).ilog2(),
             _ => 0,
+        }
+    }
+
+    /// The blocks that hold some samples.
+    pub fn blocks_around(&self, samples: Range<u64>) -> Range<u64> {
+        let size = |sample| 1_u64 << block_of(self.block_level(), sample);
+        let (start, last) = (samples.start, samples.end.saturating_sub(1));
+        start - start % size(start)..(last - last % size(last)).saturating_add(size(last))
+    }
+
+    /// The independent parts that standard errors come from, where the header tells.
+    pub fn parts(&self) -> Option<f64> {
+        match self.metadata.get(Self::PARTS) {
+            Some(Value::Number(parts)) if *parts >= 1.0 => Some(*parts),
+            _ => None,
         }
     }
 

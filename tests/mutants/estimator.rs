@@ -130,6 +130,13 @@ pub const MUTANTS: &[Mutant] = &[
         killers: &["integrator::emission::standard_error_is_that_of_the_samples"],
     },
     Mutant {
+        name: "net-column",
+        wrong: "one digit of one column of the nets is wrong",
+        file: "shaders/rng.glsl",
+        edits: &[("uvec4(185u, 64u, 85u, 9u)", "uvec4(184u, 64u, 85u, 9u)")],
+        killers: &["shading::nets::blocks_are_nets"],
+    },
+    Mutant {
         name: "blocks-as-samples",
         wrong: "deviations within a net count as those of independent samples",
         file: "shaders/film.glsl",

@@ -3,14 +3,13 @@
 
 use bytemuck::{Pod, Zeroable};
 use etendue::gpu::BindingKind;
-use etendue::layout::BLOCK_LEVEL;
+use etendue::layout::{BLOCK_LEVEL, MAX_BLOCK_LEVEL};
 use etendue::spec::Spec;
 
 use crate::statistics::{Estimate, Family, chi_square};
 use crate::{Kernel, finish, groups, open};
 
 const COUNT: usize = 1 << 20;
-const BLOCK: usize = 1 << BLOCK_LEVEL;
 
 #[repr(C)]
 #[derive(Clone, Copy, Pod, Zeroable)]
@@ -49,36 +48,67 @@ fn draw(kernel: &Kernel, first: u32, samples: usize, [event, slot]: [u32; 2]) ->
     draws.read(COUNT).unwrap()
 }
 
-/// Whether each of `BLOCK` cells, `columns` wide in x, holds one point.
-fn fills(points: impl Iterator<Item = (f32, f32)>, columns: usize) -> bool {
-    let rows = BLOCK / columns;
-    let mut cells = [0; BLOCK];
+/// The most points in a cell of a grid of `columns` × `rows`, where each has one if points are spread evenly.
+fn most(points: impl Iterator<Item = (f32, f32)>, columns: usize, rows: usize) -> u32 {
+    let mut cells = vec![0; columns * rows];
     for (x, y) in points {
         cells[(x * columns as f32) as usize * rows + (y * rows as f32) as usize] += 1;
     }
-    cells == [1; BLOCK]
+    cells.into_iter().max().unwrap()
 }
 
+/// Digits that the planes of two numbers lack for the first 2^m samples of a block, m = 4 … 8, so that a cell may hold 2^lacks points:
+/// x with y, z and w; y with z and w; z with w.
+const LACKS: [(usize, usize, [u32; 5]); 6] = [
+    (0, 1, [0, 1, 1, 0, 1]),
+    (0, 2, [0, 1, 1, 1, 0]),
+    (0, 3, [1, 1, 1, 1, 2]),
+    (1, 2, [0, 0, 0, 0, 0]),
+    (1, 3, [0, 1, 1, 0, 1]),
+    (2, 3, [0, 0, 1, 0, 0]),
+];
+
+/// Four blocks of 16, then two of each double size; each of their beginnings is a net, too.
 #[test]
 fn blocks_are_nets() {
     let Some(kernel) = kernel() else { return };
-    for place in [[0, 0], [1, 0], [1, 1], [2, 0], [1000, 2]] {
-        for (pixel, block) in draw(&kernel, 32, BLOCK, place)
-            .chunks_exact(BLOCK)
-            .enumerate()
-        {
-            for c in 0..4 {
-                let column = block.iter().map(|d| (d.number[c], 0.0));
-                assert!(fills(column, BLOCK), "{place:?}, pixel {pixel}, number {c}");
-            }
-            // The planes of the first three numbers have no gaps of any shape.
-            for (x, y) in [(0, 1), (0, 2), (1, 2)] {
-                for columns in [2, 4, 8] {
-                    let plane = block.iter().map(|d| (d.number[x], d.number[y]));
-                    assert!(
-                        fills(plane, columns),
-                        "{place:?}, pixel {pixel}, numbers {x} and {y}, {columns} columns"
+    for level in BLOCK_LEVEL..=MAX_BLOCK_LEVEL {
+        // the first block of this size, and the second
+        let start = if level == BLOCK_LEVEL { 0 } else { 2 << level };
+        for (number, place) in [
+            (0, [0, 0]),
+            (1, [1, 0]),
+            (0, [1, 1]),
+            (1, [2, 0]),
+            (0, [1000, 2]),
+        ] {
+            let block = 1_usize << level;
+            let first = start + (number << level);
+            for (pixel, samples) in draw(&kernel, first, block, place)
+                .chunks_exact(block)
+                .take(4096)
+                .enumerate()
+            {
+                for m in BLOCK_LEVEL..=level {
+                    let what = format!(
+                        "{place:?}, pixel {pixel}, 2^{m} of the 2^{level} samples from {first} on"
                     );
+                    let part = &samples[..1 << m];
+                    for c in 0..4 {
+                        let line = part.iter().map(|d| (d.number[c], 0.0));
+                        assert_eq!(most(line, 1 << m, 1), 1, "{what}, number {c}");
+                    }
+                    for (x, y, lacks) in LACKS {
+                        let lacks = lacks[(m - BLOCK_LEVEL) as usize];
+                        for columns in 1..m - lacks {
+                            let plane = part.iter().map(|d| (d.number[x], d.number[y]));
+                            let seen = most(plane, 1 << columns, 1 << (m - lacks - columns));
+                            assert!(
+                                seen <= 1 << lacks,
+                                "{what}, numbers {x} and {y}, 2^{columns} columns: {seen}"
+                            );
+                        }
+                    }
                 }
             }
         }
@@ -129,42 +159,55 @@ fn blocks_are_independent_of_each_other() {
 }
 
 /// Mean of the means of blocks.
-fn block_means(values: &[f64]) -> Estimate {
-    let means = values.chunks_exact(BLOCK);
-    Estimate::of(means.map(|b| b.iter().sum::<f64>() / BLOCK as f64))
+fn block_means(values: &[f64], block: usize) -> Estimate {
+    let means = values.chunks_exact(block);
+    Estimate::of(means.map(|b| b.iter().sum::<f64>() / block as f64))
 }
 
 #[test]
 fn nets_integrate_without_bias_and_slots_do_not_go_together() {
     let Some(kernel) = kernel() else { return };
-    let a = draw(&kernel, 0, BLOCK, [1, 0]);
-    let b = draw(&kernel, 0, BLOCK, [1, 1]);
-    let u = |d: &Draw, c: usize| f64::from(d.number[c]) - 0.5;
-    let assert_zero = |name: &str, values: &[f64]| {
-        let seen = block_means(values);
-        assert!(seen.mean.abs() < seen.chance(), "{name}: {seen:?}");
-        // of one block
-        seen.error.powi(2) * (seen.degrees + 1.0)
-    };
-    // ∫ (x − ½)(y − ½) = 0, with variance 1/144 for one sample.
-    let independent = 1.0 / 144.0 / BLOCK as f64;
-    for i in 0..4 {
-        let line: Vec<f64> = a.iter().map(|d| u(d, i)).collect();
-        let variance = assert_zero(&format!("number {i}"), &line);
-        // Stratified into 16 parts: 16⁻² of 1/12 for each sample.
-        let gain = 1.0 / 12.0 / BLOCK as f64 / variance;
-        assert!(gain > 0.95 * 256.0, "number {i}: gain {gain}");
-        for j in 0..4 {
-            let across: Vec<f64> = a.iter().zip(&b).map(|(a, b)| u(a, i) * u(b, j)).collect();
-            let variance = assert_zero(&format!("slots, {i} and {j}"), &across);
-            // Padding by shuffles: as good as independent, no better and no worse.
-            let ratio = variance / independent;
-            assert!((0.8..1.1).contains(&ratio), "slots, {i} and {j}: {ratio}");
-            if j < i {
-                let inside: Vec<f64> = a.iter().map(|d| u(d, i) * u(d, j)).collect();
-                let variance = assert_zero(&format!("numbers {i} and {j}"), &inside);
-                println!("numbers {i}, {j}: gain {:.1}", independent / variance);
-                assert!(variance < independent, "numbers {i} and {j}");
+    // The first blocks, and the first of the largest.
+    for (first, level) in [(0, BLOCK_LEVEL), (512, MAX_BLOCK_LEVEL)] {
+        let block = 1_usize << level;
+        let a = draw(&kernel, first, block, [1, 0]);
+        let b = draw(&kernel, first, block, [1, 1]);
+        let u = |d: &Draw, c: usize| f64::from(d.number[c]) - 0.5;
+        let assert_zero = |name: &str, values: &[f64]| {
+            let seen = block_means(values, block);
+            assert!(seen.mean.abs() < seen.chance(), "{name}: {seen:?}");
+            // of one block
+            seen.error.powi(2) * (seen.degrees + 1.0)
+        };
+        // ∫ (x − ½)(y − ½) = 0, with variance 1/144 for one sample.
+        let independent = 1.0 / 144.0 / block as f64;
+        for i in 0..4 {
+            let line: Vec<f64> = a.iter().map(|d| u(d, i)).collect();
+            let variance = assert_zero(&format!("number {i}"), &line);
+            // Stratified into as many parts as samples, n: n⁻² of 1/12 for each sample.
+            let gain = 1.0 / 12.0 / block as f64 / variance;
+            let parts = (block * block) as f64;
+            // (as much as 4096 blocks tell)
+            assert!(gain > 0.93 * parts, "{block}, number {i}: gain {gain}");
+            for j in 0..4 {
+                let across: Vec<f64> = a.iter().zip(&b).map(|(a, b)| u(a, i) * u(b, j)).collect();
+                let variance = assert_zero(&format!("slots, {i} and {j}"), &across);
+                // Padding by shuffles: as good as independent, no better and no worse.
+                let ratio = variance / independent;
+                println!("{block}: slots {i} and {j}: {ratio:.3}");
+                assert!(
+                    (0.8..1.1).contains(&ratio),
+                    "{block}: slots, {i} and {j}: {ratio}"
+                );
+                if j < i {
+                    let inside: Vec<f64> = a.iter().map(|d| u(d, i) * u(d, j)).collect();
+                    let variance = assert_zero(&format!("numbers {i} and {j}"), &inside);
+                    println!(
+                        "{block}: numbers {i}, {j}: gain {:.1}",
+                        independent / variance
+                    );
+                    assert!(variance < independent, "{block}: numbers {i} and {j}");
+                }
             }
         }
     }

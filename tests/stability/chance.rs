@@ -72,13 +72,14 @@ fn tiles_have_the_variance_of_independent_pixels() {
 fn shards_have_the_variance_of_independent_samples() {
     const SHARDS: u64 = 16;
     let scene = noisy_plane();
-    let samples = 64;
+    // Two nets of 256 each: shards that cut nets in two are not independent.
+    let samples = 512;
     let mut whole: Option<Film> = None;
     let mut sum = 0.0;
     let mut degrees = 0.0;
     let mut means: Vec<Vec<f64>> = Vec::new();
     for k in 0..SHARDS {
-        let Some(film) = picture(&scene, 32, samples * k..samples * (k + 1), 9) else {
+        let Some(film) = picture(&scene, 32, samples * (k + 1)..samples * (k + 2), 9) else {
             return;
         };
         means.push(film.mean().iter().map(|m| f64::from(m[0])).collect());
@@ -154,10 +155,10 @@ fn corner_factor(a: f64, b: f64, h: f64) -> f64 {
     (part(a, b) + part(b, a)) / (2.0 * std::f64::consts::PI)
 }
 
-/// Nets of 16 bring no plateau: squared error × samples is the same for 16 and for 1024, and for 1000, which is no
-/// number of whole nets; all of it about the closed form.
+/// Nets bring no plateau: squared error × samples does not grow from one net of 16 on, and is less where nets
+/// are larger, for 1000 samples, which are no number of whole nets, too; all of it about the closed form.
 #[test]
-fn errors_of_nets_fall_as_of_independent_samples() {
+fn errors_of_nets_fall_at_least_as_of_independent_samples() {
     const SIDE: u32 = 64;
     let truth = 0.7 * 4.0 * corner_factor(4.0, 4.0, 3.0);
     let scene = noisy_plane();
@@ -184,6 +185,11 @@ fn errors_of_nets_fall_as_of_independent_samples() {
         );
         is_likely(&format!("mean of {samples} samples"), bias);
         // 16384 pixels tell it to 1.1 % each
-        assert!((ratio - 1.0).abs() < 0.08, "{samples} samples: {ratio}");
+        let most = match samples {
+            ..256 => 1.08,
+            256 => 0.95,
+            _ => 0.8,
+        };
+        assert!(ratio < most, "{samples} samples: {ratio}");
     }
 }
