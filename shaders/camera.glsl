@@ -24,7 +24,7 @@ Ray camera_sphere_ray(vec3 centre, float radius, vec4 u)
     return Ray(centre + frame_from_z(out_of) * vec3(r * cos(turn), r * sin(turn), radius), -out_of);
 }
 
-// `pixel` counts in the full frame, row 0 at the top; `u.xy` is the place in the pixel.
+// `pixel` counts in the full frame, row 0 at the top; `u.yz` is the place in the pixel.
 Ray camera_ray(uvec2 pixel, vec4 u)
 {
     if (HAS_SENSOR && params.camera_kind == CAMERA_FLUX) {
@@ -33,7 +33,7 @@ Ray camera_ray(uvec2 pixel, vec4 u)
     if (HAS_SENSOR && params.camera_kind == CAMERA_IRRADIANCE) {
         return Ray(params.camera_position, -params.camera_forward);
     }
-    vec2 at = (vec2(pixel) + u.xy) / vec2(params.width, params.height);
+    vec2 at = (vec2(pixel) + u.yz) / vec2(params.width, params.height);
     vec3 offset = (2.0 * at.x - 1.0) * params.camera_right + (1.0 - 2.0 * at.y) * params.camera_up;
     if (params.camera_kind == CAMERA_ORTHOGRAPHIC) {
         return Ray(params.camera_position + offset, params.camera_forward);

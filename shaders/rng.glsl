@@ -17,7 +17,7 @@
 #include "spec.glsl"
 
 // Slots of one event of a path. Event 0 is the camera.
-const uint SLOT_CAMERA = 0u; // x, y: position in the pixel; sensors use all four
+const uint SLOT_CAMERA = 0u; // yz: position in the pixel; sensors use all four
 const uint SLOT_BSDF = 0u;   // x: lobe, yz: direction, w: roulette
 const uint SLOT_LIGHT = 1u;  // x: which light, yz: point on it, w: alias coin
 const uint SLOT_COVER = 2u;  // x: partial coverage

@@ -24,6 +24,9 @@ fn verdicts_have_exit_codes() {
         ("b.exr", "--spp 64 --seed 1"),
         ("c.exr", "--spp 64 --seed 2 --camera close"),
         ("d.exr", "--spp 128"),
+        // halves of a net of 256
+        ("e.exr", "--samples 512..640"),
+        ("f.exr", "--samples 640..768"),
     ]);
     let compare = |line: &str| etendue(&format!("compare {line}"), folder.path());
 
@@ -64,6 +67,8 @@ fn verdicts_have_exit_codes() {
         "{}",
         stdout(&output)
     );
+    assert!(stdout(&compare("e.exr f.exr")).contains("parts of the same nets"));
+    assert!(!stdout(&compare("d.exr e.exr")).contains("note:"));
     let difference = read(&folder, "difference.exr");
     assert!(difference.channel("deviation.G").is_some());
     let [a, d] = ["a.exr", "d.exr"].map(|name| read(&folder, name).rgb().unwrap());

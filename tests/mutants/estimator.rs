@@ -105,7 +105,7 @@ pub const MUTANTS: &[Mutant] = &[
         file: "shaders/kernel_path.glsl",
         edits: &[(
             "vec3(0.0) : result.radiance, vec3(0.0)",
-            "vec3(0.0) : result.radiance * 2.0 * rng_uniform(path.key, 0u, SLOT_CAMERA).x, vec3(0.0)",
+            "vec3(0.0) : result.radiance * 2.0 * rng_uniform(path.key, 0u, SLOT_CAMERA).y, vec3(0.0)",
         )],
         killers: &["integrator::emission::radiance_of_an_emitter_is_the_same_from_everywhere"],
     },

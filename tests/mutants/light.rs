@@ -376,7 +376,7 @@ pub const MUTANTS: &[Mutant] = &[
         name: "pixel-centre",
         wrong: "all rays of a pixel go through its middle",
         file: "shaders/camera.glsl",
-        edits: &[("(vec2(pixel) + u.xy)", "(vec2(pixel) + 0.5)")],
+        edits: &[("(vec2(pixel) + u.yz)", "(vec2(pixel) + 0.5)")],
         killers: &["shading::lookups::camera_rays_go_through_their_pixels"],
     },
 ];

@@ -199,7 +199,7 @@ fn camera_rays_go_through_their_pixels() {
     let mut rng = Rng(32);
     let mut queries: Vec<Query> = (0..100_000)
         .map(|_| Query {
-            u: [rng.uniform32(), rng.uniform32(), 0.0, 0.0],
+            u: [0.0, rng.uniform32(), rng.uniform32(), 0.0],
             index: SIZE.map(|n| (rng.uniform() * f64::from(n)) as u32),
         })
         .collect();
@@ -228,7 +228,8 @@ fn camera_rays_go_through_their_pixels() {
         };
         let answers: Vec<Answer> = scene.ask(&device, CAMERA, &queries);
         for (q, answer) in queries.iter().zip(&answers) {
-            let at = |k: usize| (f64::from(q.index[k]) + f64::from(q.u[k])) / f64::from(SIZE[k]);
+            let at =
+                |k: usize| (f64::from(q.index[k]) + f64::from(q.u[1 + k])) / f64::from(SIZE[k]);
             // Row 0 is at the top.
             let (x, y) = ((2.0 * at(0) - 1.0) * half_width, (1.0 - 2.0 * at(1)) * half);
             let (origin, direction) = if is_perspective {
