@@ -57,9 +57,13 @@ fn lossless_solids_are_invisible_in_a_white_world() {
             &settings,
             1e-4,
         );
-        // Shading normals are not those of the surface: a little light is trapped.
+        // Shading normals are not those of the surface: a little light is trapped, and rare paths carry it.
         let scene = in_white(sphere(3), glass(1.5, clear));
-        assert_white(&format!("{backend:?}, ball"), &scene, &settings, 2e-3);
+        let many = Settings {
+            samples: 0..1024,
+            ..settings.clone()
+        };
+        assert_white(&format!("{backend:?}, ball"), &scene, &many, 2e-3);
         let scene = in_white(square(Vec3::ZERO, Vec3::Z, 1.0), sheet(1.5));
         assert_white(&format!("{backend:?}, sheet"), &scene, &settings, 1e-5);
     }
