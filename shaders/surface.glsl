@@ -222,17 +222,20 @@ bool surface_is_skipped(uint instance, uint primitive)
     return is_solid ? !surface_skip_asks(uvec2(material, instance)) : surface_skip.is_closed;
 }
 
-bool surface_is_opaque(uint instance, uint primitive, vec2 bary)
+// Whether a triangle's material leaves out this place.
+bool surface_is_cut(uint instance, uint primitive, vec2 bary)
 {
-    if (HAS_NESTED && surface_is_skipped(instance, primitive)) {
-        return false;
-    }
     if (!HAS_ALPHA) {
-        return true;
+        return false;
     }
     uvec4 triangle = surface_triangle(instance, primitive);
     Material material = scene_material(triangle.w & TRIANGLE_MATERIAL_MASK);
-    return surface_base_color(material, triangle, bary).a >= material.alpha_cutoff;
+    return surface_base_color(material, triangle, bary).a < material.alpha_cutoff;
+}
+
+bool surface_is_opaque(uint instance, uint primitive, vec2 bary)
+{
+    return !(HAS_NESTED && surface_is_skipped(instance, primitive)) && !surface_is_cut(instance, primitive, bary);
 }
 
 // Radiance that leaves a point of an emitter, before its side is asked.

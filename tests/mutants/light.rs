@@ -256,8 +256,8 @@ pub const MUTANTS: &[Mutant] = &[
         wrong: "cut-outs are solid",
         file: "shaders/surface.glsl",
         edits: &[(
-            "return surface_base_color(material, triangle, bary).a >= material.alpha_cutoff;",
-            "return true;",
+            "return surface_base_color(material, triangle, bary).a < material.alpha_cutoff;",
+            "return false;",
         )],
         killers: &["traversal::table::alpha_mask_on_and_off"],
     },

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use etendue::film::Film;
 use etendue::layout::{NONE, ProbeHit, ProbeRay};
-use etendue::render::Tuning;
+use etendue::render::{Tuning, devices};
 use etendue::scene::{Camera, Projection, Scene, gltf};
 use etendue::settings::{BackendChoice, Settings};
 use glam::DVec3;
@@ -22,6 +22,9 @@ const PROBED: (u32, u32) = (160, 128);
 /// Rays whose ids may differ, as a share: those on edges.
 const MOST_OTHER_IDS: f64 = 1e-4;
 const TILE: u32 = 8;
+/// Pixels of the same samples that differ by more than rounding, as a share, where all traversals run our own test of triangles.
+/// Nested solids have 2.7 %, other scenes 0.3 % at most; shadow rays that ended at what is cut out, 13 %.
+const MOST_OTHER_PIXELS: f64 = 0.05;
 
 /// Rays through the centres of pixels from the first camera, relative to the scene's origin.
 pub fn primary_rays(scene: &Scene, (width, height): (u32, u32)) -> Vec<ProbeRay> {
@@ -105,6 +108,15 @@ fn assert_even(label: &str, a: &Film, b: &Film) {
     let excess = f64::from(brighter.abs_diff(darker));
     let bound = 5.0 * f64::from(brighter + darker).sqrt() + 8.0;
     assert!(excess <= bound, "{label}: {brighter} : {darker}");
+    let is_cpu = devices()
+        .unwrap()
+        .iter()
+        .all(|d| d.name.contains("llvmpipe"));
+    let most = MOST_OTHER_PIXELS * f64::from(WIDTH * HEIGHT);
+    assert!(
+        !is_cpu || f64::from(brighter + darker) <= most,
+        "{label}: {brighter} + {darker}"
+    );
 }
 
 /// One side of a comparison: what it answered, and how it numbers.
