@@ -87,7 +87,9 @@ fn every_step_of_writing_may_fail() {
         film.add(first, level, values).unwrap();
     }
     let header = Metadata::new();
-    let image = Image::from_film(&film, &[], header.clone()).unwrap();
+    let mut image = Image::from_film(&film, &[], header.clone()).unwrap();
+    // Entries of a header are written in any order, and the bytes of two files are compared here.
+    image.metadata.clear();
     every_step_fails_cleanly("a.json", &|path| write_bytes(path, b"{}"));
     every_step_fails_cleanly("a.exr", &|path| write_exr(path, &image));
     every_step_fails_cleanly("a.png", &|path| write_png(path, &image, Tone::Srgb, 0.0));
