@@ -3,7 +3,7 @@
 
 use etendue::Result;
 
-/// Samples of a net: counts are multiples of it, so that errors are those of whole nets.
+/// Samples of the first nets: counts are multiples of it.
 const BLOCK: u64 = 16;
 /// Below two nets the samples of one count as independent, and errors as up to three times too large.
 const LEAST: u64 = 2 * BLOCK;

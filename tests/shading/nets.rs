@@ -86,7 +86,6 @@ fn blocks_are_nets() {
             let first = start + (number << level);
             for (pixel, samples) in draw(&kernel, first, block, place)
                 .chunks_exact(block)
-                .take(4096)
                 .enumerate()
             {
                 for m in BLOCK_LEVEL..=level {
@@ -187,8 +186,9 @@ fn nets_integrate_without_bias_and_slots_do_not_go_together() {
             // Stratified into as many parts as samples, n: n⁻² of 1/12 for each sample.
             let gain = 1.0 / 12.0 / block as f64 / variance;
             let parts = (block * block) as f64;
-            // (as much as 4096 blocks tell)
-            assert!(gain > 0.93 * parts, "{block}, number {i}: gain {gain}");
+            // The largest are 4096 blocks only.
+            let least = if level == BLOCK_LEVEL { 0.95 } else { 0.93 };
+            assert!(gain > least * parts, "{block}, number {i}: gain {gain}");
             for j in 0..4 {
                 let across: Vec<f64> = a.iter().zip(&b).map(|(a, b)| u(a, i) * u(b, j)).collect();
                 let variance = assert_zero(&format!("slots, {i} and {j}"), &across);

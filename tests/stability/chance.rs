@@ -185,11 +185,11 @@ fn errors_of_nets_fall_at_least_as_of_independent_samples() {
         );
         is_likely(&format!("mean of {samples} samples"), bias);
         // 16384 pixels tell it to 1.1 % each
-        let most = match samples {
-            ..256 => 1.08,
-            256 => 0.95,
-            _ => 0.8,
+        let wanted = match samples {
+            ..256 => 0.92..1.08,
+            256 => 0.0..0.95,
+            _ => 0.0..0.8,
         };
-        assert!(ratio < most, "{samples} samples: {ratio}");
+        assert!(wanted.contains(&ratio), "{samples} samples: {ratio}");
     }
 }
