@@ -3,6 +3,7 @@
 // work with scattering that happens to find a light.
 //
 // [Veach97] §9. [Kulla12] Kulla, Fajardo, Importance Sampling Techniques for Path Tracing in Participating Media.
+// [Talbot05] Talbot, Cline, Egbert, Importance Resampling for Global Illumination.
 
 #ifndef DIRECT_GLSL
 #define DIRECT_GLSL
@@ -12,6 +13,7 @@
 #include "interior.glsl"
 #include "lights.glsl"
 #include "medium.glsl"
+#include "rng.glsl"
 
 const bool HAS_LIGHTS = HAS_ENVIRONMENT || HAS_AREA_LIGHTS || HAS_PUNCTUAL;
 
@@ -103,6 +105,77 @@ vec3 shadow_arrives(Shadow s, inout uint rays)
     return HAS_MEDIA ? s.value * medium_transmittance(scene_medium(s.interior.current), s.t_max) : s.value;
 }
 
+// Light that may arrive, and how much if nothing is in the way.
+struct DirectLight {
+    LightSample light;
+    vec3 value;
+    vec3 at;        // where it is scattered
+};
+
+// The normal by which lights are chosen for a surface: 0 where light from both sides counts.
+vec3 direct_normal(SurfacePoint s, Bsdf bsdf)
+{
+    return bsdf_transmits_widely(bsdf) ? vec3(0.0) : s.ng;
+}
+
+// How far the numbers of one sample of a light are from those of the next, multiples of 2⁻²³: parts of the golden ratio's relatives.
+const vec3 CANDIDATE_TURNS = vec3(5184444.0, 6332377.0, 4780167.0) / 8388608.0;
+
+// Samples of lights of which one is followed. What the tree does not know, the BSDF's lobes, matters most where the camera sees it.
+int direct_candidates(bool is_first)
+{
+    return HAS_SPECULAR && is_first ? 4 : 2;
+}
+
+// Direct light by one sample of a light, which a surface scatters along wo, in the frame, for throughput one.
+DirectLight direct_sample(SurfacePoint s, Bsdf bsdf, mat3 frame, vec3 wo, LightView view, vec4 u)
+{
+    DirectLight direct = DirectLight(light_sample(s.position, view, u), vec3(0.0), s.position);
+    LightSample light = direct.light;
+    float side = dot(light.wi, s.ng);
+    if (light.pdf > 0.0 && (side > 0.0 || (bsdf_transmits_widely(bsdf) && side < 0.0))) {
+        BsdfValue value = bsdf_eval(bsdf, wo, light.wi * frame);
+        float weight = direct_light_weight(light.is_delta, light.pdf, value.pdf);
+        direct.value = (weight / light.pdf) * value.f_cos * light.radiance;
+    }
+    return direct;
+}
+
+// The same by several samples of lights: one, in proportion to what it gives if nothing is in the way, with the mean of
+// what all give [Talbot05]. They have the first one's numbers, turned, so that they are spread evenly.
+DirectLight direct_on_surface(SurfacePoint s, Bsdf bsdf, mat3 frame, vec3 wo, uvec4 key, uint event, bool is_first)
+{
+    LightView view = light_view_surface(s.position, direct_normal(s, bsdf));
+    vec4 u = rng_uniform(key, event, SLOT_LIGHT);
+    if (!HAS_LIGHT_TREE) {
+        return direct_sample(s, bsdf, frame, wo, view, u);
+    }
+    int count = direct_candidates(is_first);
+    vec4 turn = vec4(1.0 / float(count), CANDIDATE_TURNS);
+    float coin = rng_coin(key, event, SLOT_CANDIDATE);
+    float sum = 0.0;
+    DirectLight direct;
+    direct.light.wi = s.ng;
+    direct.value = vec3(0.0);
+    for (int k = 0; k < count; k++) {
+        DirectLight candidate = direct_sample(s, bsdf, frame, wo, view, u);
+        u = sample_turned(u, turn);
+        float weight = candidate.value.x + candidate.value.y + candidate.value.z;
+        if (weight > 0.0) {
+            sum += weight;
+            float share = weight / sum;
+            bool is_taken = coin < share;
+            coin = is_taken ? coin / share : (coin - share) / (1.0 - share);
+            if (is_taken) {
+                direct = candidate;
+                direct.value /= weight;
+            }
+        }
+    }
+    direct.value *= sum / float(count);
+    return direct;
+}
+
 // Density, relative to that of the flight's own, with which the light at `point` would have drawn its distance.
 float direct_equiangular_ratio(Flight flight, vec3 point)
 {
@@ -126,13 +199,6 @@ LightView direct_view(Flight flight)
 {
     return LightView(flight.origin, flight.direction, flight.end);
 }
-
-// Light that may arrive, and how much if nothing is in the way.
-struct DirectLight {
-    LightSample light;
-    vec3 value;
-    vec3 at;        // where it is scattered
-};
 
 // Direct light that a point in a medium scatters back along the flight, for throughput one.
 DirectLight direct_in_medium(Medium medium, Flight flight, vec4 u)

@@ -1,9 +1,9 @@
 // Radiance from infinity: a constant, or a latitude–longitude map that is
 // reconstructed bilinearly. Directions are sampled in proportion to a bilinear function too, whose values at
 // the centres of texels stand beside the radiance: a table chooses the cell between
-// four centres, and within it the warp is exact. So a sun of few texels has no noise of its own.
+// four centres, and within it the warp is exact. So a sun of few texels has no noise of its own, and since neighbours on
+// the map are neighbours in the table, numbers that are spread evenly are directions that are.
 //
-// [Vose91] Vose, A Linear Algorithm for Generating Random Numbers.
 // [PBRT4] Pharr, Jakob, Humphreys, Physically Based Rendering, 4th edition, §A.5.2 (bilinear functions).
 
 #ifndef ENVIRONMENT_GLSL
@@ -67,15 +67,32 @@ vec3 environment_radiance(vec3 d, out float pdf)
     return params.env_radiance * value.rgb;
 }
 
-// A direction by the map's density. The pdf includes the choice of the map.
-EnvironmentSample environment_sample(vec3 u, float coin)
+// The cell that holds a place: u chooses one of 2²³ parts of all places, and `fine` the place in it.
+uint environment_cell(float u, float fine)
 {
+    // Where the map is chosen among others, u takes larger steps, and `fine` fills them.
+    float part = u * 8388608.0;
+    float whole_part = floor(part);
+    part = part - whole_part + (fine - 0.5) / params.env_choice;
+    float carry = floor(part);
+    uint place = uint(whole(whole_part) + int(carry)) * 512u + uint(whole(floor((part - carry) * 512.0)));
+    uvec2 run = texelFetch(env_table, int(place >> params.env_shift)).xy;
+    if (run.y == NONE) {
+        return run.x;
+    }
+    while (run.x < run.y) {
+        uint middle = (run.x + run.y) >> 1u;
+        run = place > texelFetch(env_table, int(middle)).x ? uvec2(middle + 1u, run.y) : uvec2(run.x, middle);
+    }
+    return texelFetch(env_table, int(run.x)).y;
+}
+
+// A direction by the map's density. The pdf includes the choice of the map.
+EnvironmentSample environment_sample(vec3 u, float fine)
+{
+    uint cell = environment_cell(u.x, fine);
     // A row of cells between two rows of texels, and half a row at each pole.
     int height = int(params.env_height);
-    uint count = params.env_width * (params.env_height + 1u);
-    uint cell = min(uint(u.x * float(count)), count - 1u);
-    uvec2 entry = texelFetch(env_table, int(cell)).xy;
-    cell = coin < uintBitsToFloat(entry.x) ? cell : entry.y;
     // Integers are divided lane by lane on CPUs. The quotient of floats is off by one at most.
     int width = int(params.env_width);
     int row = whole(floor(float(cell) / float(width)));

@@ -44,6 +44,7 @@ struct Params {
     uint env_height;
     float env_cos_rotation;
     float env_sin_rotation;
+    uint env_shift;          // log₂ of the places in a run of the table
     uint bvh_root;           // first node of the top level (of the only level without instances)
     // With HAS_LIGHT_TREE:
     float tree_choice;       // probability that direct light samples the tree; table_choice is then for distant lights
@@ -249,11 +250,15 @@ const uint LIGHT_PLAIN = 0x80000000u;        // `intensity` is all: no texture, 
 const uint LIGHT_DOUBLE_SIDED = 0x40000000u; // emits from both sides
 const uint LIGHT_MIRRORED = 0x20000000u;     // the front sees its corners clockwise
 
-// Alias table over the cells between the centres of four texels of the environment map: env_height + 1 rows. Read as two words.
+// The cells between the centres of four texels of the environment map, env_height + 1 rows, of which each has its share of the
+// places from 0 to 2³² − 1. Neighbours on the map are neighbours there. Read as two words.
 struct EnvCell {
-    float keep;
-    uint alias;
+    uint last;               // of its places; the next cell begins after it
+    uint cell;
 };
+
+// Before them stand two words for each of 2^(32 − env_shift) equal runs of places: a cell and NONE where it holds the whole
+// run, else the entries that hold the run's first place and its last.
 
 // --- Probe: rays in, hits out (tests, identity layers) -------------------------
 
@@ -318,7 +323,7 @@ const uint BIND_TEXTURE_USES = 8u;   // texel buffer RGBA32UI: TextureUse[]
 const uint BIND_TEXELS = 9u;         // texel buffer R32UI
 const uint BIND_LIGHTS = 10u;        // texel buffer RGBA32UI: Light[]
 const uint BIND_ENV_MAP = 11u;       // texel buffer RGBA32F
-const uint BIND_ENV_TABLE = 12u;     // EnvCell[]
+const uint BIND_ENV_TABLE = 12u;     // runs and EnvCell[], two words each
 const uint BIND_SCENE = 13u;         // acceleration structure (ray query)
 const uint BIND_BVH_NODES = 14u;     // texel buffer RGBA32UI, five texels a node (own BVH)
 const uint BIND_BVH_TRIANGLES = 15u; // texel buffer RGBA32UI, three texels a triangle (own BVH)

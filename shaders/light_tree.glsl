@@ -13,16 +13,16 @@
 // What the choice errs on the generous side by, in cosines: bounds are rounded.
 const float CLUSTER_SLACK = 1.0e-3;
 
-// Where light is asked for: a point, or a segment in a medium, whose light may be scattered anywhere on it.
+// Where light is asked for: a point of a surface, or a segment in a medium, whose light may be scattered anywhere on it.
 struct LightView {
     vec3 origin;
-    vec3 direction;  // unit
-    float end;       // metres; 0: the point `origin`
+    vec3 direction;  // unit; of a surface: its normal, or 0 where light from both sides counts
+    float end;       // metres; below 0: a surface
 };
 
-LightView light_view_point(vec3 point)
+LightView light_view_surface(vec3 point, vec3 normal)
 {
-    return LightView(point, vec3(0.0), 0.0);
+    return LightView(point, normal, -1.0);
 }
 
 vec3 light_axis(uint packed)
@@ -40,27 +40,43 @@ vec2 light_angle_beyond(vec2 a, vec2 b)
     return a.x >= b.x ? vec2(1.0, 0.0) : vec2(a.x * b.x + a.y * b.y, a.y * b.x - a.x * b.y);
 }
 
+// Cosine and sine of an angle in [0, π].
+vec2 light_angle(float cosine)
+{
+    return vec2(cosine, sqrt(max(1.0 - cosine * cosine, 0.0)));
+}
+
+// The largest cosine that an angle can have that is smaller by `reach` at most.
+float light_cosine_bound(vec2 angle, vec2 reach)
+{
+    return max(light_angle_beyond(angle, reach).x + CLUSTER_SLACK, 0.0);
+}
+
 // In proportion to the most that the cluster in two texels can give at the view.
 float light_importance(uvec4 sphere, uvec4 cone, LightView view)
 {
     vec3 to = uintBitsToFloat(sphere.xyz) - view.origin;
-    bool is_segment = HAS_SCATTERING && view.end > 0.0;
+    bool is_segment = HAS_SCATTERING && view.end >= 0.0;
     if (is_segment) {
         to -= clamp(dot(to, view.direction), 0.0, view.end) * view.direction;
     }
     float radius2 = square(uintBitsToFloat(sphere.w));
     float distance2 = dot(to, to);
     float cosine_cone = uintBitsToFloat(cone.y);
-    float facing = 1.0;
-    if (distance2 > radius2 && !is_segment && cosine_cone > -1.0) {
-        float c = -dot(light_axis(cone.x), to) * inversesqrt(distance2);
-        vec2 angle = vec2(c, sqrt(max(1.0 - c * c, 0.0)));
+    float cosines = 1.0;
+    if (distance2 > radius2 && !is_segment) {
+        to *= inversesqrt(distance2);
         float sine2 = radius2 / distance2;
-        angle = light_angle_beyond(angle, vec2(cosine_cone, sqrt(max(1.0 - cosine_cone * cosine_cone, 0.0))));
-        angle = light_angle_beyond(angle, vec2(sqrt(1.0 - sine2), sqrt(sine2)));
-        facing = max(angle.x + CLUSTER_SLACK, 0.0);
+        vec2 reach = vec2(sqrt(1.0 - sine2), sqrt(sine2));
+        if (cosine_cone > -1.0) {
+            vec2 angle = light_angle_beyond(light_angle(-dot(light_axis(cone.x), to)), light_angle(cosine_cone));
+            cosines = light_cosine_bound(angle, reach);
+        }
+        if (!HAS_DIELECTRIC || view.direction != vec3(0.0)) {
+            cosines *= light_cosine_bound(light_angle(dot(view.direction, to)), reach);
+        }
     }
-    return uintBitsToFloat(cone.z) * facing / max(distance2, radius2);
+    return uintBitsToFloat(cone.z) * cosines / max(distance2, radius2);
 }
 
 // Importance of both children of a node, and their links.

@@ -58,6 +58,7 @@ struct PathState {
     bool can_be_sampled;   // direct light could have found what the ray finds
     float pdf;             // of the last scattering, per steradian
     vec3 scattered_at;
+    vec3 scattered_normal; // as `LightView` has it
     Interior interior;
     float camera_ior;      // index of what surrounds the camera
     float scale;           // radiance at the camera over radiance here: (n_camera / n)²
@@ -180,7 +181,7 @@ float path_found_weight(PathState path, float pdf_light, vec3 point, bool is_inf
 LightView path_view(PathState path)
 {
     bool is_medium = HAS_SCATTERING && path.flight.pdf > 0.0;
-    return is_medium ? direct_view(path.flight) : light_view_point(path.scattered_at);
+    return is_medium ? direct_view(path.flight) : light_view_surface(path.scattered_at, path.scattered_normal);
 }
 
 // Starts the path of one sample at the camera.
@@ -199,6 +200,7 @@ PathState path_start(uvec4 key, uvec2 pixel)
     path.can_be_sampled = false;
     path.pdf = 0.0;
     path.scattered_at = ray.origin;
+    path.scattered_normal = vec3(0.0);
     path.interior = interior_empty();
     path.camera_ior = 1.0;
     path.scale = 1.0;
@@ -287,13 +289,9 @@ void path_surface(inout PathState path, inout PathResult result, SurfacePoint s,
     }
     // Direct light. A mirror has no density that a light's sample could meet.
     if (HAS_LIGHTS && !is_last && bsdf_has_density(bsdf)) {
-        LightSample light = light_sample(s.position, light_view_point(s.position), rng_uniform(path.key, path.event, SLOT_LIGHT));
-        float side = dot(light.wi, s.ng);
-        bool is_beyond = bsdf_transmits_widely(bsdf) && side < 0.0;
-        if (light.pdf > 0.0 && (side > 0.0 || is_beyond)) {
-            BsdfValue value = bsdf_eval(bsdf, wo_local, light.wi * frame);
-            float weight = direct_light_weight(light.is_delta, light.pdf, value.pdf);
-            vec3 contribution = (weight / light.pdf) * path.beta * value.f_cos * light.radiance;
+        DirectLight direct = direct_on_surface(s, bsdf, frame, wo_local, path.key, path.event, path.depth == 0u);
+        if (max_component(direct.value) > 0.0) {
+            bool is_beyond = HAS_DIELECTRIC && dot(direct.light.wi, s.ng) < 0.0;
             vec3 origin = is_beyond ? far_side : offset_origin(s.start, s.error, s.ng);
             Interior there = path.interior;
             float scale = path.scale;
@@ -301,7 +299,7 @@ void path_surface(inout PathState path, inout PathResult result, SurfacePoint s,
                 there = boundary.beyond;
                 scale = square(path.camera_ior / interior_ior(boundary.after));
             }
-            path_light(path, result, there, origin, s.record, light, scale * contribution);
+            path_light(path, result, there, origin, s.record, direct.light, scale * path.beta * direct.value);
         }
     }
 
@@ -340,6 +338,7 @@ void path_surface(inout PathState path, inout PathResult result, SurfacePoint s,
     path.pdf = next.pdf;
     path.can_be_sampled = next.pdf > 0.0;
     path.scattered_at = s.position;
+    path.scattered_normal = direct_normal(s, bsdf);
     path.flight.pdf = 0.0;
 }
 

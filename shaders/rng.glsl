@@ -23,6 +23,7 @@ const uint SLOT_LIGHT = 1u;  // x: which light, yz: point on it, w: alias coin
 const uint SLOT_COVER = 2u;  // x: partial coverage
 const uint SLOT_MEDIUM = 3u; // x: channel, y: distance, z: distance by the light
 const uint SLOT_SEGMENT = 4u; // as SLOT_LIGHT, for light along a segment
+const uint SLOT_CANDIDATE = 5u; // which sample of a light is followed
 const uint SLOT_COUNT = 8u;
 
 uvec4 rng_pcg4d(uvec4 v)
@@ -124,6 +125,13 @@ vec4 rng_uniform(uvec4 key, uint event, uint slot)
         bits = rng_pcg4d(key ^ uvec4(0u, 0u, dimension, 0x85EBCA6Bu));
     }
     return (vec4(bits >> 9u) + 0.5) * (1.0 / 8388608.0);
+}
+
+// One uniform number in (0, 1), of no net and independent of all others.
+float rng_coin(uvec4 key, uint event, uint slot)
+{
+    uint bits = rng_pcg4d(key ^ uvec4(0u, 0u, event * SLOT_COUNT + slot, 0x165667B1u)).x;
+    return (float(bits >> 9u) + 0.5) * (1.0 / 8388608.0);
 }
 
 #endif

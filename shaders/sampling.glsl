@@ -28,6 +28,12 @@ float sample_linear(float u, float a, float b)
     return divisor > 0.0 ? min(u * (a + b) / divisor, 1.0) : u;
 }
 
+// Numbers in (0, 1), multiples of 2⁻²³ plus 2⁻²⁴, moved on by `turn`, multiples of 2⁻²³, around from 1 to 0: exact.
+vec4 sample_turned(vec4 u, vec4 turn)
+{
+    return u + mix(turn, turn - 1.0, greaterThan(u, 1.0 - turn));
+}
+
 // Weight of a sample drawn with density `mine` that another technique would have
 // drawn with density `other`. Written with the ratio, so that large densities do
 // not overflow. [Veach97] power heuristic, exponent 2.

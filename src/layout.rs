@@ -68,6 +68,7 @@ shared! {
         env_height: u32,
         env_cos_rotation: f32,
         env_sin_rotation: f32,
+        env_shift: u32,
         bvh_root: u32,
         tree_choice: f32,
         light_nodes: u32,
@@ -171,8 +172,8 @@ shared! {
         emission_pdf: f32,
     }
     EnvCell {
-        keep: f32,
-        alias: u32,
+        last: u32,
+        cell: u32,
     }
     ProbeRay {
         origin: [f32; 3],

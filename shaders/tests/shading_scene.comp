@@ -38,7 +38,7 @@ Answer environment_answer(vec4 u)
 
 Answer light_answer(vec4 u)
 {
-    LightSample s = light_sample(vec3(0.0), light_view_point(vec3(0.0)), u);
+    LightSample s = light_sample(vec3(0.0), light_view_surface(vec3(0.0), vec3(0.0)), u);
     if (!(s.pdf > 0.0)) {
         return Answer(vec4(0.0), vec4(0.0), vec4(0.0));
     }

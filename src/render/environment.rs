@@ -1,5 +1,5 @@
 //! An environment map as kernels sample it: a density that is bilinear between the centres of texels, and
-//! an alias table over the cells between four of them.
+//! a table of the cells between four of them, along a curve.
 //!
 //! \[Karlik19\] Karlík, Šik, Vévoda, Skřivan, Křivánek, MIS Compensation: Optimizing
 //! Sampling Techniques in Multiple Importance Sampling.
@@ -8,7 +8,8 @@ use std::f64::consts::PI;
 
 use glam::Vec3;
 
-use super::lights::{alias_table, sampling_weight};
+use super::curve::along_hilbert;
+use super::lights::sampling_weight;
 use crate::layout;
 use crate::mutant;
 
@@ -19,8 +20,8 @@ const COMPENSATION: f64 = 1.0;
 pub(crate) struct SampledMap {
     /// Radiance without the map's intensity, and the density in (u, v) over 2π².
     pub texels: Vec<[f32; 4]>,
-    /// Cells between the centres of texels, a row of half the height at each pole.
-    pub cells: Vec<layout::EnvCell>,
+    /// Where to look for the cell of a place, and the cells between the centres of texels, a row of half the height at each pole.
+    pub table: CellTable,
     /// Mean of the map over the sphere, as a scalar for sampling.
     pub mean: f64,
 }
@@ -68,15 +69,64 @@ impl SampledMap {
             .zip(&densities)
             .map(|(&[r, g, b], d)| [r, g, b, (d / total / (2.0 * PI * PI)) as f32])
             .collect();
-        let cells = alias_table(&in_cells)
-            .into_iter()
-            .map(|(keep, alias)| layout::EnvCell { keep, alias })
-            .collect();
         Some(Self {
             texels,
-            cells,
+            table: CellTable::new([width, height + 1], &in_cells),
             mean,
         })
+    }
+}
+
+/// Cells by their places from 0 to 2³² − 1.
+pub(crate) struct CellTable {
+    /// Runs of places and then cells, as kernels read them.
+    pub words: Vec<[u32; 2]>,
+    /// log₂ of the places in a run.
+    pub shift: u32,
+}
+
+impl CellTable {
+    /// Each of `size` cells gets its share of the places, in an order in which neighbours stay together: samples that
+    /// are spread evenly over the places are spread evenly over the map.
+    fn new(size: [usize; 2], weights: &[f64]) -> Self {
+        let scale = (1_u64 << 32) as f64 / weights.iter().sum::<f64>();
+        let mut cells: Vec<layout::EnvCell> = Vec::new();
+        let (mut sum, mut end) = (0.0, 0_u64);
+        along_hilbert(size, &mut |index| {
+            sum += weights[index] * scale;
+            let next = (sum.round() as u64).min(1 << 32);
+            if next > end {
+                let (last, cell) = ((next - 1) as u32, index as u32);
+                cells.push(layout::EnvCell { last, cell });
+                end = next;
+            }
+        });
+        if let Some(cell) = cells.last_mut() {
+            cell.last = u32::MAX;
+        }
+        // Most runs lie in one cell and need no more than a look.
+        let level = cells.len().max(2).ilog2();
+        let shift = 32 - level;
+        let runs = 1_u32 << level;
+        let mut at = 0;
+        let mut words = Vec::with_capacity(cells.len() + runs as usize);
+        for run in 0..runs {
+            let last = ((u64::from(run + 1) << shift) - 1) as u32;
+            let first = at;
+            while cells[at].last < last {
+                at += 1;
+            }
+            words.push(if first == at {
+                [cells[at].cell, layout::NONE]
+            } else {
+                [runs + first as u32, runs + at as u32]
+            });
+            if cells[at].last == last {
+                at += 1;
+            }
+        }
+        words.extend(cells.iter().map(|c| [c.last, c.cell]));
+        Self { words, shift }
     }
 }
 
@@ -110,15 +160,43 @@ mod tests {
         texels
     }
 
-    /// Probability of each cell by the alias table.
+    /// Entries of the cells, after those of the runs.
+    fn entries(table: &CellTable) -> &[[u32; 2]] {
+        &table.words[1 << (32 - table.shift)..]
+    }
+
+    /// Probability of each cell by the table.
     fn chances(map: &SampledMap) -> Vec<f64> {
-        let count = map.cells.len() as f64;
-        let mut chances = vec![0.0; map.cells.len()];
-        for (i, cell) in map.cells.iter().enumerate() {
-            chances[i] += f64::from(cell.keep) / count;
-            chances[cell.alias as usize] += (1.0 - f64::from(cell.keep)) / count;
+        let mut chances = vec![0.0; SIZE[0] * (SIZE[1] + 1)];
+        let mut first = 0;
+        for &[last, cell] in entries(&map.table) {
+            let end = u64::from(last) + 1;
+            chances[cell as usize] += (end - first) as f64 / (1_u64 << 32) as f64;
+            first = end;
         }
+        assert_eq!(first, 1 << 32);
         chances
+    }
+
+    #[test]
+    fn runs_say_where_their_cells_are() {
+        for others in [0.0, 0.5] {
+            let map = SampledMap::new(SIZE, &one_bright(others), false).unwrap();
+            let CellTable { words, shift } = &map.table;
+            let entry = |place: u32| {
+                let before = entries(&map.table).iter().filter(|e| e[0] < place);
+                before.count() + (1 << (32 - shift))
+            };
+            for run in 0..1_u32 << (32 - shift) {
+                let first = entry(run << shift);
+                let last = entry((run << shift) | ((1 << shift) - 1));
+                let expected = match first == last {
+                    true => [words[first][1], layout::NONE],
+                    false => [first as u32, last as u32],
+                };
+                assert_eq!(words[run as usize], expected, "{others}: run {run}");
+            }
+        }
     }
 
     #[test]

@@ -4,6 +4,7 @@
 
 mod backend;
 mod boxes;
+mod curve;
 mod emitters;
 mod environment;
 pub mod geometry;

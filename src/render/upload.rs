@@ -29,7 +29,7 @@ pub(crate) struct SceneData {
     /// The light table as texels, then the nodes and the keys of the tree.
     pub lights: Vec<[u32; 4]>,
     pub env_map: Vec<[f32; 4]>,
-    pub env_table: Vec<layout::EnvCell>,
+    pub env_table: Vec<[u32; 2]>,
 }
 
 impl SceneData {
@@ -144,7 +144,8 @@ impl SceneData {
                 self.params.env_cos_rotation = f64::from(*rotation).cos() as f32;
                 self.params.env_sin_rotation = f64::from(*rotation).sin() as f32;
                 self.env_map = map.texels;
-                self.env_table = map.cells;
+                self.env_table = map.table.words;
+                self.params.env_shift = map.table.shift;
                 let radius = self.geometry.radius;
                 4.0 * std::f64::consts::PI.powi(2)
                     * radius

@@ -306,6 +306,13 @@ pub const MUTANTS: &[Mutant] = &[
         killers: &["etendue::render::environment::tests::cells_hold_the_integral_of_the_density"],
     },
     Mutant {
+        name: "environment-run",
+        wrong: "of the environment's cells in a run of places the first is always taken",
+        file: "shaders/environment.glsl",
+        edits: &[("while (run.x < run.y) {", "while (false) {")],
+        killers: &["shading::environment::directions_have_their_density"],
+    },
+    Mutant {
         name: "environment-mirrored",
         wrong: "the environment left to right",
         file: "shaders/environment.glsl",
@@ -358,6 +365,26 @@ pub const MUTANTS: &[Mutant] = &[
             "0.5 : 0.0;",
         )],
         killers: &["integrator::lamps::lamps_of_many_shapes"],
+    },
+    Mutant {
+        name: "cluster-horizon",
+        wrong: "where scattering found the emitter, the tree of lights is asked for the other side of the surface",
+        file: "shaders/path.glsl",
+        edits: &[(
+            "light_view_surface(path.scattered_at, path.scattered_normal)",
+            "light_view_surface(path.scattered_at, -path.scattered_normal)",
+        )],
+        killers: &["integrator::lamps::lamps_of_many_shapes"],
+    },
+    Mutant {
+        name: "candidate-share",
+        wrong: "of several samples of lights any is followed, not in proportion to what it gives",
+        file: "shaders/direct.glsl",
+        edits: &[(
+            "float share = weight / sum;",
+            "float share = 1.0 / float(k + 1);",
+        )],
+        killers: &["integrator::lamps::points_of_light_add_up"],
     },
     Mutant {
         name: "environment-choice",

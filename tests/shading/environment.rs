@@ -2,11 +2,11 @@
 
 use std::f64::consts::{PI, TAU};
 
-use etendue::layout::{EnvCell, Params};
+use etendue::layout::{NONE, Params};
 use glam::DVec3;
 
 use crate::fixture::Rng;
-use crate::scene::{ENVIRONMENT, Query, RADIANCE, Scene, alias_table};
+use crate::scene::{ENVIRONMENT, Query, RADIANCE, Scene};
 use crate::statistics::{Family, chi_square};
 use crate::{finish, open};
 
@@ -54,12 +54,10 @@ fn map() -> (Vec<f64>, Vec<[f64; 3]>, Scene) {
             env_choice: CHOICE as f32,
             env_cos_rotation: ROTATION.cos() as f32,
             env_sin_rotation: ROTATION.sin() as f32,
+            env_shift: RUN_SHIFT,
             ..Params::default()
         },
-        env_table: alias_table(&cells)
-            .iter()
-            .map(|&(keep, alias)| EnvCell { keep, alias })
-            .collect(),
+        env_table: cell_table(&cells),
         env_map: texels.clone(),
         has_environment: true,
         ..Scene::default()
@@ -69,6 +67,37 @@ fn map() -> (Vec<f64>, Vec<[f64; 3]>, Scene) {
         .map(|t| [t[0], t[1], t[2]].map(f64::from))
         .collect();
     (densities, texels, scene)
+}
+
+/// log₂ of the places in a run of the table: some runs lie in one cell, others hold several.
+const RUN_SHIFT: u32 = 26;
+
+/// The table of cells in the order of their indices: runs of places, then the last place of each cell.
+fn cell_table(cells: &[f64]) -> Vec<[u32; 2]> {
+    let total: f64 = cells.iter().sum();
+    let mut sum = 0.0;
+    let mut entries = Vec::new();
+    for (i, cell) in cells.iter().enumerate() {
+        sum += cell / total;
+        if *cell > 0.0 {
+            let end = (sum * 2_f64.powi(32)).round() as u64;
+            entries.push([(end - 1) as u32, i as u32]);
+        }
+    }
+    let runs = 1_u32 << (32 - RUN_SHIFT);
+    let entry = |place: u32| entries.iter().filter(|e| e[0] < place).count();
+    let look = |run: u32| {
+        let first = entry(run << RUN_SHIFT);
+        let last = entry((run << RUN_SHIFT) + (1 << RUN_SHIFT) - 1);
+        match first == last {
+            true => [entries[first][1], NONE],
+            false => [runs + first as u32, runs + last as u32],
+        }
+    };
+    let mut table: Vec<[u32; 2]> = (0..runs).map(look).collect();
+    assert!(table.iter().any(|w| w[1] == NONE) && table.iter().any(|w| w[1] != NONE));
+    table.extend(entries);
+    table
 }
 
 /// Height of a row of cells in v, and its middle. Rows lie between those of texels; half a row is left at each pole.

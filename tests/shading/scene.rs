@@ -43,7 +43,7 @@ pub struct Scene {
     pub texels: Vec<u32>,
     pub lights: Vec<layout::Light>,
     pub env_map: Vec<[f32; 4]>,
-    pub env_table: Vec<layout::EnvCell>,
+    pub env_table: Vec<[u32; 2]>,
     pub has_environment: bool,
     pub has_area_lights: bool,
     pub has_punctual: bool,
