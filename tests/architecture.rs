@@ -35,8 +35,8 @@ const MAY_USE: &[(&str, &[&str])] = &[
     (
         "render",
         &[
-            "bvh", "error", "fault", "film", "gpu", "layout", "mutant", "scene", "settings",
-            "spec", "wgpu",
+            "bvh", "error", "fault", "film", "gpu", "image_io", "layout", "mutant", "scene",
+            "settings", "spec", "wgpu",
         ],
     ),
 ];

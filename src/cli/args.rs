@@ -217,6 +217,9 @@ pub struct RenderArgs {
     /// Everything that lowers the error for the time, or the yardstick
     #[arg(long, value_enum, default_value_t = EstimatorName::Full)]
     pub estimator: EstimatorName,
+    /// Keep the tree over the scene's triangles in this folder, so that later renders of them start sooner; safe to delete
+    #[arg(long, value_name = "FOLDER")]
+    pub cache: Option<PathBuf>,
 
     /// Share of samples that may be dropped, since they were not finite, before the render counts as failed
     #[arg(long, value_name = "X", default_value_t = 1e-6, allow_negative_numbers = true, value_parser = not_negative)]

@@ -60,7 +60,7 @@ pub fn run(args: &MeasureArgs) -> Result<Outcome, Failure> {
     };
     let device = DeviceOptions {
         device: args.device.clone(),
-        validation: false,
+        ..DeviceOptions::default()
     };
     let mut renderer = Renderer::new(&scene, &settings, &device)?;
     interrupt.begin_rendering();

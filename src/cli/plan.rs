@@ -50,7 +50,8 @@ pub fn check_host(settings: &Settings) -> Result<()> {
 pub fn devices(args: &RenderArgs) -> Result<Vec<DeviceOptions>> {
     let options = |device: Option<String>| DeviceOptions {
         device,
-        validation: false,
+        cache: args.cache.clone(),
+        ..DeviceOptions::default()
     };
     let Some(text) = &args.device else {
         return Ok(vec![options(None)]);

@@ -4,6 +4,7 @@
 
 mod backend;
 mod boxes;
+mod cache;
 mod curve;
 mod emitters;
 mod environment;
@@ -30,6 +31,7 @@ mod wgpu;
 mod workshop;
 
 use std::ops::Range;
+use std::path::PathBuf;
 use std::time::Instant;
 
 use crate::error::{Error, Result};
@@ -63,13 +65,15 @@ const PASS_SECONDS: f64 = 1.0;
 /// Tiles of the first batch: few enough for the slowest device and scene.
 const FIRST_BATCH_TILES: u32 = 16;
 
-/// Which device, and whether to watch it.
+/// Which device, whether to watch it, and what there is from earlier renders.
 #[derive(Clone, Debug, Default)]
 pub struct DeviceOptions {
     /// Index or part of the name; `None` takes the fastest kind.
     pub device: Option<String>,
     /// Runs the Khronos validation layer.
     pub validation: bool,
+    /// Folder that keeps trees of scenes, so that they need not be built again; safe to delete.
+    pub cache: Option<PathBuf>,
 }
 
 /// Renders one scene with one group of settings on one device.
@@ -146,7 +150,10 @@ impl Renderer {
             way if BackendChoice::WGPU.contains(&way) => {
                 Box::new(WgpuBackend::new(device.caps(), way, &data)?)
             }
-            _ => Box::new(VulkanBackend::new(&device, choice, &data, &tuning)?),
+            _ => {
+                let bvh = traversal::own_tree(choice, &data, options.cache.as_deref())?;
+                Box::new(VulkanBackend::new(&device, choice, &data, bvh, &tuning)?)
+            }
         };
         let build = start.elapsed().as_secs_f64();
         let start = Instant::now();
@@ -439,7 +446,7 @@ pub fn devices() -> Result<Vec<DeviceInfo>> {
 /// Geometry that no tree can hold.
 pub fn model(scene: &Scene, settings: &Settings) -> Result<SceneModel> {
     let mut data = SceneData::new(scene, settings, geometry::DEFAULT_COPY_LIMIT);
-    let bvh = traversal::build_bvh(&data)?;
+    let bvh = traversal::build_bvh(&data, None)?;
     if let Some(planes) = planes::Planes::of(&bvh, &data) {
         planes.note(&mut data.spec, &mut data.params);
     }
@@ -465,7 +472,7 @@ pub fn plan(scene: &Scene, settings: &Settings, options: &DeviceOptions) -> Resu
     settings.validate()?;
     let (device, backend, backend_reason) = vulkan::open(settings.backend, options, None)?;
     let data = SceneData::new(scene, settings, geometry::DEFAULT_COPY_LIMIT);
-    let bvh = traversal::own_tree(backend, &data)?;
+    let bvh = traversal::own_tree(backend, &data, options.cache.as_deref())?;
     let range = device.caps().max_storage_range;
     let film = backend::film_bytes(range, &data.params, data.spec.aovs);
     let memory = room::estimate(&data, bvh.as_ref(), film);

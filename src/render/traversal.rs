@@ -1,6 +1,7 @@
 //! The ways to answer "what does this ray meet?": our own tree, or the device's ray
 //! query or ray tracing pipeline. They differ in what is built, bound, compiled and launched.
 
+use std::path::Path;
 use std::sync::Arc;
 
 use glam::Vec3;
@@ -8,7 +9,7 @@ use glam::Vec3;
 use super::geometry::{Geometry, Group};
 use super::upload::SceneData;
 use super::vulkan::{RECORDS, texel};
-use super::{Study, boxes};
+use super::{Study, boxes, cache};
 use crate::bvh::{Bvh, GroupDesc, InstanceDesc, Quality};
 use crate::error::Result;
 use crate::gpu::{
@@ -25,16 +26,20 @@ pub(super) const GROUP: u32 = 64;
 /// The best tree is built of scenes with so many triangles, in a quarter of a second more.
 const BEST_TRIANGLES: usize = 1 << 18;
 
-/// The own tree of a scene, where rays are traced in it.
-pub(super) fn own_tree(choice: BackendChoice, data: &SceneData) -> Result<Option<Bvh>> {
+/// The own tree of a scene, where rays are traced in it; `cache` is a folder of trees.
+pub(super) fn own_tree(
+    choice: BackendChoice,
+    data: &SceneData,
+    cache: Option<&Path>,
+) -> Result<Option<Bvh>> {
     match choice {
         BackendChoice::RayQuery | BackendChoice::RayPipeline => Ok(None),
-        _ => build_bvh(data).map(Some),
+        _ => build_bvh(data, cache).map(Some),
     }
 }
 
-/// The own tree of a scene.
-pub(super) fn build_bvh(data: &SceneData) -> Result<Bvh> {
+/// The own tree of a scene; `cache` is a folder of trees.
+pub(super) fn build_bvh(data: &SceneData, cache: Option<&Path>) -> Result<Bvh> {
     let geometry = &data.geometry;
     let positions: Vec<Vec<Vec3>> = geometry
         .groups
@@ -83,7 +88,7 @@ pub(super) fn build_bvh(data: &SceneData) -> Result<Bvh> {
         0..=BEST_TRIANGLES => Quality::Best,
         _ => Quality::Balanced,
     };
-    Bvh::build(&groups, &instances, quality)
+    cache::tree(cache, &groups, &instances, quality)
 }
 
 /// Tells the kernels where the trees of the groups and of the top level start.

@@ -6,11 +6,10 @@ use std::sync::Arc;
 use super::backend::{Backend, Batch, Frame, film_bytes, film_floats, read_ledger, workers};
 use super::planes::Planes;
 use super::room;
-use super::traversal::{
-    GROUP, Traversal, build_scene, note_roots, note_small, own_tree, upload_bvh,
-};
+use super::traversal::{GROUP, Traversal, build_scene, note_roots, note_small, upload_bvh};
 use super::upload::SceneData;
 use super::{DeviceOptions, Ledger, Memory, TraversalCounts, Tuning, Workshop};
+use crate::bvh::Bvh;
 use crate::error::{Error, Result};
 use crate::gpu::{
     self, BindSet, BindingKind, Buffer, Device, DeviceKind, DeviceRequest, Pipeline, Resource,
@@ -79,17 +78,17 @@ pub(super) struct VulkanBackend {
 }
 
 impl VulkanBackend {
-    /// Uploads a scene.
+    /// Uploads a scene; `bvh` is its own tree, where rays are traced in it.
     pub fn new(
         device: &Arc<Device>,
         choice: BackendChoice,
         data: &SceneData,
+        bvh: Option<Bvh>,
         tuning: &Tuning,
     ) -> Result<Self> {
         let is_cpu = device.caps().kind == DeviceKind::Cpu;
         let mut params = data.params;
         let mut spec = data.spec;
-        let bvh = own_tree(choice, data)?;
         let film_bytes = film_bytes(device.caps().max_storage_range, &params, data.spec.aovs);
         let mut memory = room::estimate(data, bvh.as_ref(), film_bytes);
         room::check(device, &memory, tuning.device_bytes)?;

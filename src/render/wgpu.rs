@@ -32,7 +32,7 @@ impl WgpuBackend {
         let device = Device::open(&caps.name)?;
         let mut params = data.params;
         let mut instances = data.instances.clone();
-        let bvh = build_bvh(data)?;
+        let bvh = build_bvh(data, None)?;
         note_roots(&bvh, data, &mut params, &mut instances);
 
         let arrays = [

@@ -76,7 +76,7 @@ pub fn run(select: Option<&str>, tell: &mut dyn FnMut(&Check)) -> Result<SelfTes
     let options = DeviceOptions {
         // The same device, whatever its name matches.
         device: Some(caps.index.to_string()),
-        validation: false,
+        ..DeviceOptions::default()
     };
     let mut backends = vec![BackendChoice::Bvh];
     match &caps.ray_query {

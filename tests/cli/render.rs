@@ -100,6 +100,41 @@ fn a_crop_has_the_pixels_of_the_frame() {
 }
 
 #[test]
+fn a_kept_tree_changes_no_pixel() {
+    if !has_device() {
+        return;
+    }
+    let folder = scene();
+    let trees = folder.path().join("kept/trees");
+    let pixels = |name: &str, extra: &str| {
+        render(
+            &folder,
+            &format!("-o {name} --spp 4 --width 16 --backend bvh {extra}"),
+        );
+        read(&folder, name).channels
+    };
+    let plain = pixels("a.exr", "");
+    assert!(pixels("b.exr", "--cache kept/trees") == plain);
+    let [name] = &list(&trees)[..] else {
+        panic!("one file: {:?}", list(&trees));
+    };
+    assert!(pixels("c.exr", "--cache kept/trees") == plain);
+    // What is damaged is built, and what cannot be kept is said.
+    fs::write(trees.join(name), "damaged").unwrap();
+    assert!(pixels("d.exr", "--cache kept/trees") == plain);
+    let output = render(
+        &folder,
+        "-o e.exr --spp 4 --width 16 --backend bvh --cache scene.gltf",
+    );
+    let messages = stderr(&output);
+    assert!(
+        messages.contains("not kept for later renders"),
+        "{messages}"
+    );
+    assert!(read(&folder, "e.exr").channels == plain);
+}
+
+#[test]
 fn the_seed_decides_the_pixels() {
     if !has_device() {
         return;

@@ -38,8 +38,8 @@ pub fn render(scene: &Scene, settings: &Settings, tuning: Tuning) -> Option<Rend
 /// A renderer under validation, or the printed reason why there is none.
 pub fn open(scene: &Scene, settings: &Settings, tuning: Tuning) -> Option<Renderer> {
     let options = DeviceOptions {
-        device: None,
         validation: true,
+        ..DeviceOptions::default()
     };
     match Renderer::made_in(&WORKSHOP, scene, settings, &options, tuning) {
         Ok(renderer) => Some(renderer),

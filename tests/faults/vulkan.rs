@@ -39,8 +39,8 @@ fn render(scene: &Scene, backend: BackendChoice, at: u64, manner: Manner) -> End
         ..Settings::default()
     };
     let options = DeviceOptions {
-        device: None,
         validation: true,
+        ..DeviceOptions::default()
     };
     arm(Plan {
         kind: Kind::Vulkan,

@@ -145,8 +145,8 @@ fn a_renderer_that_starts_again_is_as_good_as_a_new_one() {
 #[test]
 fn a_workshop_changes_no_bit_of_a_picture() {
     let options = DeviceOptions {
-        device: None,
         validation: true,
+        ..DeviceOptions::default()
     };
     for backend in offered() {
         let settings = plain(backend);

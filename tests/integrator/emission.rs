@@ -157,8 +157,8 @@ fn samples_that_overflow_are_counted() {
     };
     scene.environment = constant_sky(f32::MAX);
     let options = etendue::render::DeviceOptions {
-        device: None,
         validation: true,
+        ..Default::default()
     };
     let settings = Settings {
         aovs: true,

@@ -41,8 +41,8 @@ pub fn largest_difference(a: &Film, b: &Film) -> f64 {
 /// A renderer under validation, or the error that it makes; `None` with a printed reason without a device.
 pub fn open(scene: &Scene, settings: &Settings, tuning: Tuning) -> Option<Result<Renderer, Error>> {
     let options = DeviceOptions {
-        device: None,
         validation: true,
+        ..DeviceOptions::default()
     };
     match Renderer::made_in(&WORKSHOP, scene, settings, &options, tuning) {
         Err(error @ Error::Unsupported { .. }) if !is_device_required() => {

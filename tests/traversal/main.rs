@@ -70,8 +70,8 @@ fn open(scene: &Scene, settings: &Settings, levels: Levels) -> Option<Renderer> 
 /// The same with other details.
 fn open_tuned(scene: &Scene, settings: &Settings, tuning: Tuning) -> Option<Renderer> {
     let options = DeviceOptions {
-        device: None,
         validation: true,
+        ..DeviceOptions::default()
     };
     match Renderer::made_in(&WORKSHOP, scene, settings, &options, tuning) {
         Ok(renderer) => {

@@ -13,7 +13,7 @@ fn team(scene: &str, settings: &etendue::settings::Settings, count: usize) -> Te
     let scene = gltf::load(scene.as_ref()).unwrap();
     let device = DeviceOptions {
         device: Some(String::from("0")),
-        validation: false,
+        ..DeviceOptions::default()
     };
     Team::new(&scene, settings, &vec![device; count]).unwrap()
 }

@@ -55,7 +55,7 @@ pub fn run(args: &BenchArgs) -> Result<Outcome, Failure> {
     }
     let options = DeviceOptions {
         device: args.device.clone(),
-        validation: false,
+        ..DeviceOptions::default()
     };
     let device = device(args, &options)?;
     let mut out = Output::create(args)?;
