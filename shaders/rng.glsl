@@ -45,8 +45,11 @@ uvec4 rng_pcg4d(uvec4 v)
 // next, so that the samples so far are always some blocks that tell the error (`Film`).
 uint rng_block_level(uint sample_low, uint sample_high)
 {
-    int level = findMSB(sample_low) - 1;
-    return sample_high != 0u ? MAX_BLOCK_LEVEL : uint(clamp(level, int(BLOCK_LEVEL), int(MAX_BLOCK_LEVEL)));
+    uint level = BLOCK_LEVEL;
+    while (level < MAX_BLOCK_LEVEL && (sample_high != 0u || sample_low >> (level + 2u) != 0u)) {
+        level++;
+    }
+    return level;
 }
 
 // Key of one pixel sample. `pixel` counts in the full frame, so that crops and
@@ -110,12 +113,17 @@ uvec4 rng_net(uint place)
     return v;
 }
 
+uint rng_dimension(uint event, uint slot)
+{
+    return event * SLOT_COUNT + slot;
+}
+
 // Four uniform numbers in the open interval (0, 1): multiples of 2⁻²³ plus 2⁻²⁴,
 // exact in fp32, so neither 0 nor 1 can occur.
 vec4 rng_uniform(uvec4 key, uint event, uint slot)
 {
     uvec4 bits;
-    uint dimension = event * SLOT_COUNT + slot;
+    uint dimension = rng_dimension(event, slot);
     if (HAS_STRATA) {
         uvec4 words = rng_pcg4d(uvec4(key.xy, key.z ^ dimension, 0x85EBCA6Bu));
         // Slots see the block in orders of their own, so that they do not go together.
@@ -130,7 +138,7 @@ vec4 rng_uniform(uvec4 key, uint event, uint slot)
 // One uniform number in (0, 1), of no net and independent of all others.
 float rng_coin(uvec4 key, uint event, uint slot)
 {
-    uint bits = rng_pcg4d(key ^ uvec4(0u, 0u, event * SLOT_COUNT + slot, 0x165667B1u)).x;
+    uint bits = rng_pcg4d(key ^ uvec4(0u, 0u, rng_dimension(event, slot), 0x165667B1u)).x;
     return (float(bits >> 9u) + 0.5) * (1.0 / 8388608.0);
 }
 

@@ -71,12 +71,16 @@ uvec4 surface_triangle(uint instance, uint primitive)
 }
 
 // Corners in the space of their group.
-void surface_corners(uint instance, uint primitive, out vec3 a, out vec3 b, out vec3 c)
+void surface_corners_of(uvec4 triangle, out vec3 a, out vec3 b, out vec3 c)
 {
-    uvec4 triangle = surface_triangle(instance, primitive);
     a = texelFetch(vertices, int(2u * triangle.x)).xyz;
     b = texelFetch(vertices, int(2u * triangle.y)).xyz;
     c = texelFetch(vertices, int(2u * triangle.z)).xyz;
+}
+
+void surface_corners(uint instance, uint primitive, out vec3 a, out vec3 b, out vec3 c)
+{
+    surface_corners_of(surface_triangle(instance, primitive), a, b, c);
 }
 
 // Squares of edges over area up to which a triangle is not thin, and beyond which no more is added.
@@ -102,9 +106,8 @@ vec3 surface_error(vec3 magnitude, vec3 e1, vec3 e2)
 
 TriangleShape surface_shape(uint instance, uvec4 triangle)
 {
-    vec3 a = texelFetch(vertices, int(2u * triangle.x)).xyz;
-    vec3 b = texelFetch(vertices, int(2u * triangle.y)).xyz;
-    vec3 c = texelFetch(vertices, int(2u * triangle.z)).xyz;
+    vec3 a, b, c;
+    surface_corners_of(triangle, a, b, c);
     TriangleShape shape;
     shape.is_mirrored = false;
     vec3 magnitude = max(abs(a), max(abs(b), abs(c)));
