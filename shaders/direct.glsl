@@ -118,7 +118,7 @@ vec3 direct_normal(SurfacePoint s, Bsdf bsdf)
     return bsdf_transmits_widely(bsdf) ? vec3(0.0) : s.ng;
 }
 
-// How far the numbers of one sample of a light are from those of the next, multiples of 2⁻²³: parts of the golden ratio's relatives.
+// How far the numbers of one sample of a light are from those of the next, multiples of 2⁻²³: powers of the golden and the plastic ratio.
 const vec3 CANDIDATE_TURNS = vec3(5184444.0, 6332377.0, 4780167.0) / 8388608.0;
 
 // Samples of lights of which one is followed. What the tree does not know, the BSDF's lobes, matters most where the camera sees it.
@@ -161,7 +161,7 @@ DirectLight direct_on_surface(SurfacePoint s, Bsdf bsdf, mat3 frame, vec3 wo, uv
         DirectLight candidate = direct_sample(s, bsdf, frame, wo, view, u);
         u = sample_turned(u, turn);
         float weight = candidate.value.x + candidate.value.y + candidate.value.z;
-        if (weight > 0.0) {
+        if (weight != 0.0) {
             sum += weight;
             float share = weight / sum;
             bool is_taken = coin < share;

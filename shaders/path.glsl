@@ -103,7 +103,8 @@ bool path_survives(inout PathState path, float weight, float u)
 void path_light(inout PathState path, inout PathResult result, Interior interior, vec3 origin, uint from, LightSample light,
                 vec3 value)
 {
-    if (!(max_component(value) > 0.0)) {
+    // What is not a number goes on, and is counted with its sample.
+    if (value.x + value.y + value.z <= 0.0) {
         return;
     }
     Shadow shadow = shadow_of(interior, origin, from, light, value);
@@ -290,7 +291,7 @@ void path_surface(inout PathState path, inout PathResult result, SurfacePoint s,
     // Direct light. A mirror has no density that a light's sample could meet.
     if (HAS_LIGHTS && !is_last && bsdf_has_density(bsdf)) {
         DirectLight direct = direct_on_surface(s, bsdf, frame, wo_local, path.key, path.event, path.depth == 0u);
-        if (max_component(direct.value) > 0.0) {
+        if (!(direct.value.x + direct.value.y + direct.value.z <= 0.0)) {
             bool is_beyond = HAS_DIELECTRIC && dot(direct.light.wi, s.ng) < 0.0;
             vec3 origin = is_beyond ? far_side : offset_origin(s.start, s.error, s.ng);
             Interior there = path.interior;

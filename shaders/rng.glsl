@@ -45,11 +45,13 @@ uvec4 rng_pcg4d(uvec4 v)
 // next, so that the samples so far are always some blocks that tell the error (`Film`).
 uint rng_block_level(uint sample_low, uint sample_high)
 {
-    uint level = BLOCK_LEVEL;
-    while (level < MAX_BLOCK_LEVEL && (sample_high != 0u || sample_low >> (level + 2u) != 0u)) {
-        level++;
-    }
-    return level;
+#ifdef WGPU
+    // naga takes the result for unsigned where the number is.
+    int level = findMSB(int(sample_low >> 1u));
+#else
+    int level = findMSB(sample_low) - 1;
+#endif
+    return sample_high != 0u ? MAX_BLOCK_LEVEL : uint(clamp(level, int(BLOCK_LEVEL), int(MAX_BLOCK_LEVEL)));
 }
 
 // Key of one pixel sample. `pixel` counts in the full frame, so that crops and
