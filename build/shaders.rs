@@ -40,6 +40,11 @@ pub const SHADERS: &[(&str, &[&str], &str)] = &[
     ),
     // as path_software, with what wgpu lacks left out
     ("kernel.comp", &["TRAVERSE_SOFTWARE", "WGPU"], "path_wgpu"),
+    (
+        "kernel.comp",
+        &["TRAVERSE_QUERY", "WGPU"],
+        "path_wgpu_query",
+    ),
     ("kernel.rgen", &["TRAVERSE_PIPELINE"], "path_pipeline"),
     (
         "kernel.rgen",
@@ -107,8 +112,9 @@ pub fn compile(
     let text = read(source).expect("the shader table names files that exist");
     let mut options = shaderc::CompileOptions::new().expect("shaderc starts");
     // naga knows no OpCopyLogical, by which newer SPIR-V copies structs, and refuses the
-    // control flow that the optimiser makes (docs/decisions.md).
-    let (vulkan, spirv, level) = if macros.contains(&"WGPU") {
+    // control flow that the optimiser makes (docs/decisions.md). It reads no ray queries.
+    let is_for_naga = macros.contains(&"WGPU") && !macros.contains(&"TRAVERSE_QUERY");
+    let (vulkan, spirv, level) = if is_for_naga {
         let plain = shaderc::OptimizationLevel::Zero;
         (
             shaderc::EnvVersion::Vulkan1_1,

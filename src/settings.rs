@@ -29,10 +29,13 @@ pub enum BackendChoice {
     /// The same through wgpu, which hands the shader to the driver as it is.
     #[cfg(feature = "wgpu")]
     WgpuSpirv,
+    /// The device's ray query through wgpu, which hands the shader to the driver as it is.
+    #[cfg(feature = "wgpu")]
+    WgpuRayQuery,
 }
 
 impl BackendChoice {
-    /// The three ways through wgpu, the most usual one first; none in builds without it.
+    /// The ways through wgpu, the most usual one first; none in builds without it.
     pub const WGPU: &[Self] = &[
         #[cfg(feature = "wgpu")]
         Self::Wgpu,
@@ -40,6 +43,8 @@ impl BackendChoice {
         Self::WgpuUnchecked,
         #[cfg(feature = "wgpu")]
         Self::WgpuSpirv,
+        #[cfg(feature = "wgpu")]
+        Self::WgpuRayQuery,
     ];
 
     /// The name on the command line and in files.
@@ -55,6 +60,8 @@ impl BackendChoice {
             Self::WgpuUnchecked => "wgpu-unchecked",
             #[cfg(feature = "wgpu")]
             Self::WgpuSpirv => "wgpu-spirv",
+            #[cfg(feature = "wgpu")]
+            Self::WgpuRayQuery => "wgpu-ray-query",
         }
     }
 }

@@ -298,6 +298,8 @@ pub(crate) mod kernels {
     pub(crate) const PROBE_QUERY: Kernel = kernel!("probe_query");
     #[cfg(feature = "wgpu")]
     pub(crate) const PATH_WGPU: Kernel = kernel!("path_wgpu");
+    #[cfg(feature = "wgpu")]
+    pub(crate) const PATH_WGPU_QUERY: Kernel = kernel!("path_wgpu_query");
     pub(crate) const PATH_PIPELINE: Kernel = kernel!("path_pipeline");
     pub(crate) const PATH_PIPELINE_PLAIN: Kernel = kernel!("path_pipeline_plain");
     pub(crate) const PROBE_PIPELINE: Kernel = kernel!("probe_pipeline");

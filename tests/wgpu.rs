@@ -1,4 +1,4 @@
-//! Through wgpu: the same pictures as by our own Vulkan code, by each of the three ways.
+//! Through wgpu: the same pictures as by our own Vulkan code, by each of the four ways.
 //! Only in builds with the feature `wgpu`.
 #![allow(
     clippy::unwrap_used,
@@ -10,7 +10,7 @@ use std::path::Path;
 
 use etendue::Error;
 use etendue::film::Film;
-use etendue::render::{Control, DeviceOptions, Renderer};
+use etendue::render::{Control, DeviceOptions, Renderer, Tuning};
 use etendue::scene::gltf;
 use etendue::settings::{BackendChoice, Settings};
 
@@ -24,6 +24,10 @@ const TURNED: f64 = 0.01;
 /// A renderer of one of `scenes/`; `None` and a printed reason, or a failure where
 /// `ETENDUE_REQUIRE_DEVICE` is 1, without a device that can do it.
 fn renderer(scene: &str, backend: BackendChoice) -> Option<Renderer> {
+    tuned(scene, backend, Tuning::default())
+}
+
+fn tuned(scene: &str, backend: BackendChoice, tuning: Tuning) -> Option<Renderer> {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes");
     let scene = gltf::load(&folder.join(format!("{scene}.gltf"))).unwrap();
     let settings = Settings {
@@ -35,7 +39,7 @@ fn renderer(scene: &str, backend: BackendChoice) -> Option<Renderer> {
         ..Settings::default()
     };
     let required = std::env::var_os("ETENDUE_REQUIRE_DEVICE").is_some();
-    match Renderer::new(&scene, &settings, &DeviceOptions::default()) {
+    match Renderer::tuned(&scene, &settings, &DeviceOptions::default(), tuning) {
         Ok(renderer) => Some(renderer),
         Err(error @ Error::Unsupported { .. }) if !required => {
             println!("skipped: {error}");
@@ -77,19 +81,35 @@ fn assert_same_picture(ours: &Film, other: &Film, what: &str) {
 }
 
 fn assert_same_by_all_ways(scene: &str) {
-    let Some(mut native) = renderer(scene, BackendChoice::Bvh) else {
+    let own_tree = BackendChoice::WGPU
+        .iter()
+        .filter(|way| **way != BackendChoice::WgpuRayQuery);
+    for way in own_tree {
+        assert_same(scene, BackendChoice::Bvh, *way, Tuning::default());
+    }
+    // the structures of wgpu's making hold what ours hold: boxes, or triangles
+    for boxes in [true, false] {
+        let tuning = Tuning {
+            boxes: Some(boxes),
+            ..Tuning::default()
+        };
+        let (native, way) = (BackendChoice::RayQuery, BackendChoice::WgpuRayQuery);
+        assert_same(scene, native, way, tuning);
+    }
+}
+
+fn assert_same(scene: &str, native: BackendChoice, way: BackendChoice, tuning: Tuning) {
+    let Some(mut native) = tuned(scene, native, tuning) else {
         return;
     };
     let ours = film(&mut native);
     let rays = native.report().rays as f64;
-    for way in BackendChoice::WGPU {
-        let mut through = renderer(scene, *way).expect("the device runs compute shaders");
-        let what = format!("{scene} by {}", way.name());
-        assert_same_picture(&ours, &film(&mut through), &what);
-        let deviation = through.report().rays as f64 / rays - 1.0;
-        assert!(deviation.abs() < TURNED, "{what}: rays off by {deviation}");
-        assert_eq!(through.report().backend, *way);
-    }
+    let mut through = tuned(scene, way, tuning).expect("wgpu offers what Vulkan does");
+    let what = format!("{scene} by {}", way.name());
+    assert_same_picture(&ours, &film(&mut through), &what);
+    let deviation = through.report().rays as f64 / rays - 1.0;
+    assert!(deviation.abs() < TURNED, "{what}: rays off by {deviation}");
+    assert_eq!(through.report().backend, way);
 }
 
 #[test]
@@ -105,6 +125,11 @@ fn glass_is_the_same() {
 #[test]
 fn instances_are_the_same() {
     assert_same_by_all_ways("instances");
+}
+
+#[test]
+fn cut_outs_are_the_same() {
+    assert_same_by_all_ways("lights");
 }
 
 #[test]

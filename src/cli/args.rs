@@ -305,6 +305,9 @@ pub enum Backend {
     /// The same through wgpu, with the shader as it is
     #[cfg(feature = "wgpu")]
     WgpuSpirv,
+    /// The device's ray query through wgpu, with the shader as it is
+    #[cfg(feature = "wgpu")]
+    WgpuRayQuery,
 }
 
 impl From<Backend> for BackendChoice {
@@ -320,6 +323,8 @@ impl From<Backend> for BackendChoice {
             Backend::WgpuUnchecked => Self::WgpuUnchecked,
             #[cfg(feature = "wgpu")]
             Backend::WgpuSpirv => Self::WgpuSpirv,
+            #[cfg(feature = "wgpu")]
+            Backend::WgpuRayQuery => Self::WgpuRayQuery,
         }
     }
 }

@@ -1,5 +1,5 @@
-//! The unsafe calls of wgpu: shaders that it checks less, or not at all. The fifth
-//! rule of this folder holds for them: shaders are compiled by this crate and trusted.
+//! The unsafe calls of wgpu: shaders that it checks less, or not at all, and what it calls experimental. The
+//! fifth rule of this folder holds for shaders: they are compiled by this crate and trusted.
 
 use std::borrow::Cow;
 
@@ -25,7 +25,14 @@ pub fn passed(device: &wgpu::Device, words: &[u32], group: (u32, u32, u32)) -> w
         spirv: Some(Cow::Borrowed(words)),
         ..Default::default()
     };
-    // SAFETY: shaderc made the module for Vulkan 1.2 with core features only; its blocks have
-    // std430 offsets, and its bindings are those of the layout that it is used with.
+    // SAFETY: shaderc made the module for Vulkan 1.2 with core features, or ray queries where wgpu enabled
+    // them; its blocks have std430 offsets, and its bindings are those of the layout that it is used with.
     unsafe { device.create_shader_module_passthrough(desc) }
+}
+
+/// Leave to ask for ray queries.
+pub fn experimental() -> wgpu::ExperimentalFeatures {
+    // SAFETY: wgpu warns of errors of its own in what is experimental. Structures are built once,
+    // from buffers of the sizes that are told, before any kernel runs, and only render's yardstick uses them.
+    unsafe { wgpu::ExperimentalFeatures::enabled() }
 }

@@ -148,7 +148,7 @@ impl Renderer {
         let mut backend: Box<dyn Backend> = match choice {
             #[cfg(feature = "wgpu")]
             way if BackendChoice::WGPU.contains(&way) => {
-                Box::new(WgpuBackend::new(device.caps(), way, &data)?)
+                Box::new(WgpuBackend::new(device.caps(), way, &data, &tuning)?)
             }
             _ => {
                 let bvh = traversal::own_tree(choice, &data, options.cache.as_deref())?;
@@ -419,7 +419,13 @@ fn features(spec: &crate::spec::Spec) -> Vec<Feature> {
 pub fn devices() -> Result<Vec<DeviceInfo>> {
     let info = |caps: Caps| {
         let (major, minor, patch) = caps.api_version;
-        let through_wgpu = BackendChoice::WGPU.iter();
+        let needs = |way: &BackendChoice| match way {
+            #[cfg(feature = "wgpu")]
+            BackendChoice::WgpuRayQuery => caps.ray_query.clone(),
+            _ => caps.compute.clone(),
+        };
+        let ways = BackendChoice::WGPU.iter();
+        let through_wgpu: Vec<_> = ways.map(|way| (*way, needs(way))).collect();
         DeviceInfo {
             index: caps.index,
             name: caps.name,
@@ -432,7 +438,7 @@ pub fn devices() -> Result<Vec<DeviceInfo>> {
                 (BackendChoice::Bvh, caps.compute.clone()),
             ]
             .into_iter()
-            .chain(through_wgpu.map(|way| (*way, caps.compute.clone())))
+            .chain(through_wgpu)
             .collect(),
             subgroup: caps.subgroup_size,
         }

@@ -6,7 +6,6 @@ use std::sync::Arc;
 
 use glam::Vec3;
 
-use super::geometry::{Geometry, Group};
 use super::upload::SceneData;
 use super::vulkan::{RECORDS, texel};
 use super::{Study, boxes, cache};
@@ -105,7 +104,7 @@ pub(super) fn note_roots(
     }
 }
 
-fn world_from_object(record: &layout::Instance) -> [[f32; 3]; 4] {
+pub(super) fn world_from_object(record: &layout::Instance) -> [[f32; 3]; 4] {
     [
         record.world_from_object_x,
         record.world_from_object_y,
@@ -335,19 +334,22 @@ pub(super) fn build_scene(
     vertices: &Buffer,
 ) -> Result<(Tlas, u64)> {
     let geometry = &data.geometry;
-    let slacks = match spec.boxes {
-        true => boxes::slacks(geometry, Vec3::from(data.params.camera_position).as_dvec3()),
-        false => Vec::new(),
-    };
     let mut bytes = 0;
     let mut groups = Vec::with_capacity(geometry.groups.len());
-    for (index, group) in geometry.groups.iter().enumerate() {
-        let blas = match slacks.get(index) {
-            Some(&slack) => {
-                let boxes = boxes::around(geometry, group, slack);
-                Blas::build_boxes(device, "group", &boxes, !group.has_cutouts)?
+    for (shapes, group) in shapes(data, spec).zip(&geometry.groups) {
+        let opaque = !group.has_cutouts;
+        let blas = match &shapes {
+            Shapes::Boxes(boxes) => Blas::build_boxes(device, "group", boxes, opaque)?,
+            Shapes::Triangles(triangles) => {
+                let description = BlasGeometry {
+                    vertices,
+                    vertex_stride: 32,
+                    vertex_count: (geometry.vertices.len() / 2) as u32,
+                    triangles,
+                    opaque,
+                };
+                Blas::build(device, "group", &description)?
             }
-            None => build_group(device, geometry, group, vertices)?,
         };
         bytes += blas.bytes();
         groups.push(blas);
@@ -366,26 +368,27 @@ pub(super) fn build_scene(
     Ok((scene, bytes))
 }
 
-/// A group's triangles.
-fn build_group(
-    device: &Arc<Device>,
-    geometry: &Geometry,
-    group: &Group,
-    vertices: &Buffer,
-) -> Result<Blas> {
-    let triangles: Vec<[u32; 3]> = geometry.triangles[group.triangles.clone()]
-        .iter()
-        .map(|t| [t[0], t[1], t[2]])
-        .collect();
-    Blas::build(
-        device,
-        "group",
-        &BlasGeometry {
-            vertices,
-            vertex_stride: 32,
-            vertex_count: (geometry.vertices.len() / 2) as u32,
-            triangles: &triangles,
-            opaque: !group.has_cutouts,
-        },
-    )
+/// What a device's structure over a group is built of.
+pub(super) enum Shapes {
+    /// Indices of vertices.
+    Triangles(Vec<[u32; 3]>),
+    /// Low and high corners, one box around each triangle.
+    Boxes(Vec<[[f32; 3]; 2]>),
+}
+
+/// The shapes of each group: boxes with `spec.boxes`.
+pub(super) fn shapes<'a>(data: &'a SceneData, spec: &Spec) -> impl Iterator<Item = Shapes> + 'a {
+    let geometry = &data.geometry;
+    let slacks = match spec.boxes {
+        true => boxes::slacks(geometry, Vec3::from(data.params.camera_position).as_dvec3()),
+        false => Vec::new(),
+    };
+    let groups = geometry.groups.iter().enumerate();
+    groups.map(move |(index, group)| match slacks.get(index) {
+        Some(&slack) => Shapes::Boxes(boxes::around(geometry, group, slack)),
+        None => {
+            let triangles = &geometry.triangles[group.triangles.clone()];
+            Shapes::Triangles(triangles.iter().map(|t| [t[0], t[1], t[2]]).collect())
+        }
+    })
 }

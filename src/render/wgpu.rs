@@ -1,16 +1,19 @@
-//! The same batches through wgpu, for comparison: our own tree, with every array in a buffer
-//! of wgpu's. What differs from `vulkan` is who translates the kernel and who records it.
+//! The same batches through wgpu, for comparison: our own tree or the device's ray query, with every array in a
+//! buffer of wgpu's. What differs from `vulkan` is who translates the kernel and who records it.
 
 use super::backend::{Backend, Batch, Frame, film_bytes, film_floats, read_ledger, workers};
-use super::traversal::{GROUP, build_bvh, note_roots};
+use super::traversal::{self, GROUP, build_bvh, note_roots, world_from_object};
 use super::upload::SceneData;
-use super::{Ledger, Memory};
+use super::{Ledger, Memory, Tuning};
+use crate::bvh::Bvh;
 use crate::error::{Error, Result};
 use crate::gpu::{Caps, DeviceKind};
 use crate::layout::{self, ProbeHit, ProbeRay};
 use crate::settings::BackendChoice;
 use crate::spec::{Spec, kernels};
-use crate::wgpu::{Buffer, Device, Kernel, KernelDesc, Kind};
+use crate::wgpu::{
+    Buffer, Device, Kernel, KernelDesc, Kind, Placement, Resource, Shapes, Structures,
+};
 
 /// A scene on a device of wgpu's.
 pub(super) struct WgpuBackend {
@@ -28,14 +31,22 @@ pub(super) struct WgpuBackend {
 
 impl WgpuBackend {
     /// On the device of these `caps`, by one of the ways through wgpu.
-    pub fn new(caps: &Caps, way: BackendChoice, data: &SceneData) -> Result<Self> {
-        let device = Device::open(&caps.name)?;
+    pub fn new(caps: &Caps, way: BackendChoice, data: &SceneData, tuning: &Tuning) -> Result<Self> {
+        let device = Device::open(&caps.name, way)?;
+        let is_cpu = caps.kind == DeviceKind::Cpu;
         let mut params = data.params;
+        let mut spec = data.spec;
         let mut instances = data.instances.clone();
-        let bvh = build_bvh(data, None)?;
-        note_roots(&bvh, data, &mut params, &mut instances);
+        let (bvh, scene) = if way == BackendChoice::WgpuRayQuery {
+            spec.boxes = tuning.boxes.unwrap_or(is_cpu);
+            (None, Some(build_scene(&device, data, &spec)?))
+        } else {
+            let bvh = build_bvh(data, None)?;
+            note_roots(&bvh, data, &mut params, &mut instances);
+            (Some(bvh), None)
+        };
 
-        let arrays = [
+        let mut arrays = vec![
             (layout::BIND_INSTANCES, bytes(&instances)),
             (layout::BIND_TRIANGLES, bytes(&data.geometry.triangles)),
             (layout::BIND_VERTICES, bytes(&data.geometry.vertices)),
@@ -46,10 +57,12 @@ impl WgpuBackend {
             (layout::BIND_LIGHTS, bytes(&data.lights)),
             (layout::BIND_ENV_MAP, bytes(&data.env_map)),
             (layout::BIND_ENV_TABLE, bytes(&data.env_table)),
-            (layout::BIND_BVH_NODES, bytes(&bvh.nodes)),
-            (layout::BIND_BVH_TRIANGLES, bytes(&bvh.triangles)),
             (layout::BIND_MEDIA, bytes(&data.media)),
         ];
+        if let Some(bvh) = &bvh {
+            arrays.push((layout::BIND_BVH_NODES, bytes(&bvh.nodes)));
+            arrays.push((layout::BIND_BVH_TRIANGLES, bytes(&bvh.triangles)));
+        }
         let read_only = arrays
             .iter()
             .map(|(at, content)| device.upload(&format!("array {at}"), content, Kind::Read))
@@ -59,24 +72,39 @@ impl WgpuBackend {
         let film = device.zeros("film", film_bytes, Kind::ReadWrite)?;
         let ledger_bytes = u64::from(layout::LEDGER_SIZE) * 4;
         let ledger = device.zeros("ledger", ledger_bytes, Kind::ReadWrite)?;
-        let mut buffers = vec![
-            (layout::BIND_PARAMS, Kind::Uniform, &params_buffer),
-            (layout::BIND_FILM, Kind::ReadWrite, &film),
-            (layout::BIND_LEDGER, Kind::ReadWrite, &ledger),
+        let buffer = |kind, buffer| Resource::Buffer(kind, buffer);
+        let mut resources = vec![
+            (layout::BIND_PARAMS, buffer(Kind::Uniform, &params_buffer)),
+            (layout::BIND_FILM, buffer(Kind::ReadWrite, &film)),
+            (layout::BIND_LEDGER, buffer(Kind::ReadWrite, &ledger)),
         ];
+        resources.extend(
+            scene
+                .as_ref()
+                .map(|scene| (layout::BIND_SCENE, Resource::Scene(scene))),
+        );
         let places = arrays.iter().map(|(at, _)| *at);
-        buffers.extend(places.zip(&read_only).map(|(at, b)| (at, Kind::Read, b)));
+        resources.extend(
+            places
+                .zip(&read_only)
+                .map(|(at, b)| (at, buffer(Kind::Read, b))),
+        );
+        let kernel_of = match scene {
+            Some(_) => kernels::PATH_WGPU_QUERY,
+            None => kernels::PATH_WGPU,
+        };
         let kernel = device.kernel(&KernelDesc {
             way,
-            spirv: &kernels::PATH_WGPU.words(),
-            constants: &data.spec.constants(),
-            buffers: &buffers,
+            spirv: &kernel_of.words(),
+            constants: &spec.constants(),
+            resources: &resources,
             push_bytes: size_of::<layout::Batch>() as u32,
             group_size: GROUP,
         })?;
         let memory = Memory {
             geometry: data.geometry.bytes(),
-            acceleration: bvh.bytes(),
+            // wgpu does not say how large its structures are
+            acceleration: bvh.as_ref().map_or(0, Bvh::bytes),
             textures: data.texture_bytes(),
             tables: data.table_bytes(),
             film: film_bytes,
@@ -89,8 +117,8 @@ impl WgpuBackend {
             film,
             film_bytes,
             ledger,
-            spec: data.spec,
-            workers: workers(caps.kind == DeviceKind::Cpu),
+            spec,
+            workers: workers(is_cpu),
             memory,
         })
     }
@@ -155,6 +183,27 @@ impl Backend for WgpuBackend {
     fn validation_messages(&self) -> Vec<String> {
         Vec::new()
     }
+}
+
+/// The device's structures of the scene, of boxes with `spec.boxes`.
+fn build_scene(device: &Device, data: &SceneData, spec: &Spec) -> Result<Structures> {
+    let geometry = &data.geometry;
+    let shapes: Vec<_> = traversal::shapes(data, spec).collect();
+    let groups = shapes.iter().zip(&geometry.groups).map(|(shapes, group)| {
+        let shapes = match shapes {
+            traversal::Shapes::Triangles(triangles) => Shapes::Triangles(triangles),
+            traversal::Shapes::Boxes(boxes) => Shapes::Boxes(boxes),
+        };
+        (shapes, !group.has_cutouts)
+    });
+    let places = geometry.placements.iter().zip(&data.instances);
+    let placements: Vec<_> = places
+        .map(|(placement, record)| Placement {
+            group: placement.group,
+            world_from_object: world_from_object(record),
+        })
+        .collect();
+    device.structures(bytes(&geometry.vertices), groups, &placements)
 }
 
 fn bytes<T: bytemuck::Pod>(data: &[T]) -> &[u8] {

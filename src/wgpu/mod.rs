@@ -1,9 +1,10 @@
-//! wgpu, as a yardstick: the same kernel and the same buffers through another API, by three
+//! wgpu, as a yardstick: the same kernel and the same buffers through another API, by
 //! ways that differ in who translates the kernel. Knows nothing of scenes or light.
 //!
 //! Nothing runs past the call that started it, as in [`crate::gpu`].
 
 mod freeze;
+mod structures;
 
 use std::future::Future;
 use std::pin::pin;
@@ -19,8 +20,19 @@ use crate::settings::BackendChoice;
 /// Every binding has at least so many bytes: wgpu takes no empty ones, and none smaller than an element.
 const LEAST_BYTES: usize = 256;
 
+pub(crate) use structures::{Placement, Shapes, Structures};
+
 /// A buffer on a device.
 pub(crate) use wgpu::Buffer;
+
+/// What a kernel sees at a binding.
+#[derive(Clone, Copy)]
+pub(crate) enum Resource<'a> {
+    /// A buffer.
+    Buffer(Kind, &'a Buffer),
+    /// What rays meet.
+    Scene(&'a Structures),
+}
 
 /// How a kernel sees a buffer.
 #[derive(Clone, Copy, PartialEq, Eq)]
@@ -47,14 +59,14 @@ pub(crate) struct Kernel {
 
 /// What a kernel is made of.
 pub(crate) struct KernelDesc<'a> {
-    /// Which of the three ways it takes.
+    /// Which of the ways through wgpu it takes.
     pub way: BackendChoice,
     /// The module, with specialisation constants.
     pub spirv: &'a [u32],
     /// Their ids and values.
     pub constants: &'a [(u32, u32)],
-    /// Each binding with its buffer, in ascending order.
-    pub buffers: &'a [(u32, Kind, &'a Buffer)],
+    /// What is at each binding.
+    pub resources: &'a [(u32, Resource<'a>)],
     /// Bytes of push constants.
     pub push_bytes: u32,
     /// Invocations of a work group.
@@ -62,8 +74,8 @@ pub(crate) struct KernelDesc<'a> {
 }
 
 impl Device {
-    /// Opens the Vulkan device of this name.
-    pub fn open(name: &str) -> Result<Self> {
+    /// Opens the Vulkan device of this name for one of the ways.
+    pub fn open(name: &str, way: BackendChoice) -> Result<Self> {
         let failed = |missing: String| Error::Unsupported {
             what: format!("{name} through wgpu"),
             missing,
@@ -77,9 +89,14 @@ impl Device {
             .into_iter()
             .find(|adapter| adapter.get_info().name == name)
             .ok_or_else(|| failed(String::from("wgpu does not offer the device")))?;
-        let features = wgpu::Features::IMMEDIATES
+        let mut features = wgpu::Features::IMMEDIATES
             | wgpu::Features::SUBGROUP
             | wgpu::Features::PASSTHROUGH_SHADERS;
+        let mut experimental_features = wgpu::ExperimentalFeatures::disabled();
+        if way == BackendChoice::WgpuRayQuery {
+            features |= wgpu::Features::EXPERIMENTAL_RAY_QUERY;
+            experimental_features = passthrough::experimental();
+        }
         let missing = features - adapter.features();
         if !missing.is_empty() {
             return Err(failed(format!("wgpu's device lacks {missing}")));
@@ -87,6 +104,7 @@ impl Device {
         let request = wgpu::DeviceDescriptor {
             required_features: features,
             required_limits: adapter.limits(),
+            experimental_features,
             ..Default::default()
         };
         let (raw, queue) =
@@ -140,15 +158,14 @@ impl Device {
 
     /// Compiles a kernel and binds its buffers.
     pub fn kernel(&self, desc: &KernelDesc<'_>) -> Result<Kernel> {
-        let is_read_only = |kind: &Kind| *kind == Kind::Read;
-        let numbers: Vec<_> = desc
-            .buffers
-            .iter()
-            .map(|(at, kind, _)| (*at, is_read_only(kind)))
+        let is_read_only = |resource: &_| matches!(resource, Resource::Buffer(Kind::Read, _));
+        let resources = desc.resources.iter();
+        let numbers: Vec<_> = resources
+            .map(|(at, resource)| (*at, is_read_only(resource)))
             .collect();
         let words = freeze::freeze(desc.spirv, desc.constants, &numbers);
         let module = self.watch("kernel", || match desc.way {
-            BackendChoice::WgpuSpirv => {
+            BackendChoice::WgpuSpirv | BackendChoice::WgpuRayQuery => {
                 passthrough::passed(&self.raw, &words, (desc.group_size, 1, 1))
             }
             BackendChoice::WgpuUnchecked => passthrough::unchecked(&self.raw, &words),
@@ -157,14 +174,19 @@ impl Device {
                 source: wgpu::ShaderSource::SpirV(words.as_slice().into()),
             }),
         })?;
-        let places = || (0..).zip(desc.buffers);
+        let places = || (0..).zip(desc.resources);
         let entries: Vec<_> = places()
-            .map(|(at, (_, kind, _))| entry(at, *kind))
+            .map(|(at, (_, resource))| entry(at, resource))
             .collect();
         let resources: Vec<_> = places()
-            .map(|(binding, (_, _, buffer))| wgpu::BindGroupEntry {
+            .map(|(binding, (_, resource))| wgpu::BindGroupEntry {
                 binding,
-                resource: buffer.as_entire_binding(),
+                resource: match resource {
+                    Resource::Buffer(_, buffer) => buffer.as_entire_binding(),
+                    Resource::Scene(structures) => {
+                        wgpu::BindingResource::AccelerationStructure(&structures.scene)
+                    }
+                },
             })
             .collect();
         self.watch("pipeline", || {
@@ -294,20 +316,23 @@ fn usage(kind: Kind) -> wgpu::BufferUsages {
     usage | wgpu::BufferUsages::COPY_SRC | wgpu::BufferUsages::COPY_DST
 }
 
-fn entry(binding: u32, kind: Kind) -> wgpu::BindGroupLayoutEntry {
-    let ty = match kind {
-        Kind::Uniform => wgpu::BufferBindingType::Uniform,
-        Kind::Read | Kind::ReadWrite => wgpu::BufferBindingType::Storage {
-            read_only: kind == Kind::Read,
-        },
+fn entry(binding: u32, resource: &Resource<'_>) -> wgpu::BindGroupLayoutEntry {
+    let buffer = |ty| wgpu::BindingType::Buffer {
+        ty,
+        has_dynamic_offset: false,
+        min_binding_size: None,
     };
+    let storage = |read_only| buffer(wgpu::BufferBindingType::Storage { read_only });
     wgpu::BindGroupLayoutEntry {
         binding,
         visibility: wgpu::ShaderStages::COMPUTE,
-        ty: wgpu::BindingType::Buffer {
-            ty,
-            has_dynamic_offset: false,
-            min_binding_size: None,
+        ty: match resource {
+            Resource::Buffer(Kind::Uniform, _) => buffer(wgpu::BufferBindingType::Uniform),
+            Resource::Buffer(Kind::Read, _) => storage(true),
+            Resource::Buffer(Kind::ReadWrite, _) => storage(false),
+            Resource::Scene(_) => wgpu::BindingType::AccelerationStructure {
+                vertex_return: false,
+            },
         },
         count: None,
     }
