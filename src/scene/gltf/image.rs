@@ -3,27 +3,29 @@
 
 use std::io::Cursor;
 
-use image::{DynamicImage, ImageFormat, ImageReader};
+use image::{DynamicImage, ImageDecoder, ImageFormat, ImageReader};
 
 use super::texture::ColorSpace;
 use super::{Check, quote};
 use crate::scene::Texels;
 
-/// A decoded image.
-pub(super) struct Decoded {
+/// What the head of an image says.
+#[derive(Clone, Copy)]
+pub(super) struct Header {
+    format: ImageFormat,
     pub width: u32,
     pub height: u32,
-    pub texels: Texels,
+    /// Whether channels have sixteen bits.
+    pub is_wide: bool,
 }
 
-/// Decodes an image. `texels` is (what is left of the limit, the limit).
-pub(super) fn decode(
+/// Reads the head of an image. `texels` is (what is left of the limit, the limit).
+pub(super) fn header(
     bytes: &[u8],
     mime_type: Option<&str>,
     longest_side: u32,
     texels: (u64, u64),
-    color_space: ColorSpace,
-) -> Check<Decoded> {
+) -> Check<Header> {
     if let Some(mime) = mime_type.filter(|m| !matches!(*m, "image/png" | "image/jpeg")) {
         return Err(format!(
             "{} is not supported, only PNG and JPEG are",
@@ -33,10 +35,10 @@ pub(super) fn decode(
     let Ok(format @ (ImageFormat::Png | ImageFormat::Jpeg)) = image::guess_format(bytes) else {
         return Err(String::from("is neither a PNG nor a JPEG image"));
     };
-    let broken = |error: image::ImageError| format!("cannot be decoded: {error}");
-    let (width, height) = ImageReader::with_format(Cursor::new(bytes), format)
-        .into_dimensions()
+    let decoder = ImageReader::with_format(Cursor::new(bytes), format)
+        .into_decoder()
         .map_err(broken)?;
+    let (width, height) = decoder.dimensions();
     check_size(width, height, longest_side)?;
     let size = u64::from(width) * u64::from(height);
     check_total(size, texels.0, texels.1)?;
@@ -46,23 +48,34 @@ pub(super) fn decode(
             bytes.len()
         ));
     }
+    let color = decoder.color_type();
+    Ok(Header {
+        format,
+        width,
+        height,
+        is_wide: color.bytes_per_pixel() == 2 * color.channel_count(),
+    })
+}
 
+/// Decodes an image with this head.
+pub(super) fn decode(bytes: &[u8], header: &Header, color_space: ColorSpace) -> Check<Texels> {
     // The decoder's own allocations, for bombs in other places than the pixels:
     // sixteen-bit RGBA twice over, and a fixed sum for tables and metadata.
     const DECODER_OVERHEAD: u64 = 1 << 26;
+    let size = u64::from(header.width) * u64::from(header.height);
     let mut limits = image::Limits::default();
     limits.max_alloc = Some(size * 16 + DECODER_OVERHEAD);
-    let mut reader = ImageReader::with_format(Cursor::new(bytes), format);
+    let mut reader = ImageReader::with_format(Cursor::new(bytes), header.format);
     reader.limits(limits);
     let decoded = reader.decode().map_err(broken)?;
-    if format == ImageFormat::Jpeg && !is_whole_jpeg(bytes) {
+    if header.format == ImageFormat::Jpeg && !is_whole_jpeg(bytes) {
         return Err(String::from("ends before its end: the JPEG is incomplete"));
     }
-    Ok(Decoded {
-        width,
-        height,
-        texels: to_texels(decoded, color_space),
-    })
+    Ok(to_texels(decoded, color_space))
+}
+
+fn broken(error: image::ImageError) -> String {
+    format!("cannot be decoded: {error}")
 }
 
 /// The most pixels that an image of so many bytes can have: its decoder takes the memory for all

@@ -123,7 +123,7 @@ fn load_checked(path: &Path, limits: &Limits) -> Check<Scene> {
         meshes: std::mem::take(&mut meshes.list),
         instances,
         materials,
-        textures: textures.list,
+        textures: textures.finish()?,
         lights,
         cameras: view::load(&root, &nodes)?,
         environment,

@@ -1,7 +1,10 @@
 //! Textures and samplers: each combination of image, sampler and colour space
-//! becomes one [`Texture`].
+//! becomes one [`Texture`]. Images are decoded at the end, on all cores.
 
+use std::borrow::Cow;
 use std::collections::HashMap;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::thread;
 
 use super::accessor::Buffers;
 use super::json::{Root, Sampler, TextureInfo};
@@ -26,6 +29,17 @@ struct Key {
     color_space: ColorSpace,
 }
 
+/// An image that is still to be decoded.
+struct Pending<'a> {
+    /// Its number in the file.
+    image: u32,
+    bytes: Cow<'a, [u8]>,
+    header: image::Header,
+    color_space: ColorSpace,
+    /// The texture that it is for.
+    texture: usize,
+}
+
 /// The textures that materials have asked for so far.
 pub(super) struct Textures<'a> {
     root: &'a Root,
@@ -36,8 +50,11 @@ pub(super) struct Textures<'a> {
     known: HashMap<Key, u32>,
     /// Textures of each image.
     of_image: HashMap<u32, Vec<(ColorSpace, u32)>>,
-    /// The result.
-    pub list: Vec<Texture>,
+    /// Those of [`Self::pending`] and of [`Self::copies`] have no texels yet.
+    list: Vec<Texture>,
+    pending: Vec<Pending<'a>>,
+    /// Textures with the texels of earlier ones: (from, to).
+    copies: Vec<(usize, usize)>,
 }
 
 impl<'a> Textures<'a> {
@@ -51,7 +68,27 @@ impl<'a> Textures<'a> {
             known: HashMap::new(),
             of_image: HashMap::new(),
             list: Vec::new(),
+            pending: Vec::new(),
+            copies: Vec::new(),
         }
+    }
+
+    /// Decodes all images.
+    pub fn finish(mut self) -> Check<Vec<Texture>> {
+        for (pending, texels) in self.pending.iter().zip(decode_all(&self.pending)) {
+            let texels = texels.map_err(|what| format!("images[{}]: {what}", pending.image))?;
+            self.list[pending.texture].texels = texels;
+        }
+        for (from, to) in self.copies {
+            self.list[to].texels = match (&self.list[from].texels, &self.list[to].texels) {
+                (Texels::Rgba8 { data, .. }, Texels::Rgba8 { srgb, .. }) => Texels::Rgba8 {
+                    data: data.clone(),
+                    srgb: *srgb,
+                },
+                (texels, _) => texels.clone(),
+            };
+        }
+        Ok(self.list)
     }
 
     /// How many texels the limit still allows.
@@ -109,18 +146,18 @@ impl<'a> Textures<'a> {
     }
 
     fn add(&mut self, key: Key, files: &mut Files) -> Check<u32> {
+        let index = self.list.len();
         let texture = match self.same_bits(&key) {
             Some(other) => self.copy(other, &key),
-            None => self.decode(&key, files),
+            None => self.announce(&key, files),
         };
         let texture = texture.map_err(|what| format!("images[{}]: {what}", key.image))?;
         self.texels += u64::from(texture.width) * u64::from(texture.height);
-        let index = self.list.len() as u32;
         self.list.push(texture);
-        self.known.insert(key, index);
+        self.known.insert(key, index as u32);
         let of_image = self.of_image.entry(key.image).or_default();
-        of_image.push((key.color_space, index));
-        Ok(index)
+        of_image.push((key.color_space, index as u32));
+        Ok(index as u32)
     }
 
     /// A texture with the same image, whose texels do not depend on how they differ.
@@ -134,10 +171,11 @@ impl<'a> Textures<'a> {
         others.find(is_same).map(|(_, index)| index)
     }
 
-    fn copy(&self, index: usize, key: &Key) -> Check<Texture> {
+    fn copy(&mut self, index: usize, key: &Key) -> Check<Texture> {
         let other = &self.list[index];
         let size = u64::from(other.width) * u64::from(other.height);
         image::check_total(size, self.texels_left(), self.limits.texels)?;
+        self.copies.push((index, self.list.len()));
         let mut copy = Texture {
             wrap: key.wrap,
             filter: key.filter,
@@ -149,36 +187,78 @@ impl<'a> Textures<'a> {
         Ok(copy)
     }
 
-    fn decode(&self, key: &Key, files: &mut Files) -> Check<Texture> {
+    /// A texture without its texels, and what they will be decoded from.
+    fn announce(&mut self, key: &Key, files: &mut Files) -> Check<Texture> {
         let image = &self.root.images[key.image as usize];
         let user = format!("images[{}]", key.image);
-        let owned;
-        let bytes: &[u8] = match (&image.uri, image.buffer_view) {
-            (Some(uri), None) => {
-                owned = files.fetch(uri)?;
-                &owned
-            }
-            (None, Some(view)) => self.buffers.view(view, &user)?.0,
+        let bytes = match (&image.uri, image.buffer_view) {
+            (Some(uri), None) => Cow::Owned(files.fetch(uri)?),
+            (None, Some(view)) => Cow::Borrowed(self.buffers.view(view, &user)?.0),
             _ => return Err(String::from("needs exactly one of uri and bufferView")),
         };
-        let decoded = image::decode(
-            bytes,
+        let header = image::header(
+            &bytes,
             image.mime_type.as_deref(),
             self.limits.image_side,
             (self.texels_left(), self.limits.texels),
-            key.color_space,
         )?;
+        self.pending.push(Pending {
+            image: key.image,
+            bytes,
+            header,
+            color_space: key.color_space,
+            texture: self.list.len(),
+        });
         let is_file = |uri: &&String| !uri.starts_with("data:");
         let name = image.name.as_ref().or(image.uri.as_ref().filter(is_file));
+        let srgb = key.color_space == ColorSpace::Srgb;
         Ok(Texture {
             name: name.cloned().unwrap_or(user),
-            width: decoded.width,
-            height: decoded.height,
-            texels: decoded.texels,
+            width: header.width,
+            height: header.height,
+            texels: match header.is_wide {
+                true => Texels::Rgba16(Vec::new()),
+                false => Texels::Rgba8 {
+                    data: Vec::new(),
+                    srgb,
+                },
+            },
             wrap: key.wrap,
             filter: key.filter,
         })
     }
+}
+
+/// The texels of each image, in order.
+fn decode_all(images: &[Pending]) -> Vec<Check<Texels>> {
+    let cores = thread::available_parallelism().map_or(1, usize::from);
+    let next = AtomicUsize::new(0);
+    let work = || -> Vec<_> {
+        let taken = std::iter::from_fn(|| {
+            let index = next.fetch_add(1, Ordering::Relaxed);
+            images.get(index).map(|image| (index, image))
+        });
+        let decode =
+            |image: &Pending| image::decode(&image.bytes, &image.header, image.color_space);
+        taken.map(|(index, image)| (index, decode(image))).collect()
+    };
+    let mut all: Vec<_> = thread::scope(|scope| {
+        let others: Vec<_> = (1..cores.min(images.len()))
+            .map(|_| scope.spawn(work))
+            .collect();
+        let mut all = work();
+        for other in others {
+            // A decoder that panics in a thread panics here.
+            all.extend(
+                other
+                    .join()
+                    .unwrap_or_else(|panic| std::panic::resume_unwind(panic)),
+            );
+        }
+        all
+    });
+    all.sort_unstable_by_key(|(index, _)| *index);
+    all.into_iter().map(|(_, texels)| texels).collect()
 }
 
 /// The set of coordinates and the matrix on them.
