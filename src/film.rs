@@ -12,6 +12,8 @@
 //! References: \[Chan83\] Chan, Golub, LeVeque: Algorithms for Computing the
 //! Sample Variance, The American Statistician 37 (1983).
 
+mod interval;
+
 use std::collections::BTreeMap;
 use std::ops::Range;
 

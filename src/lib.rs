@@ -18,6 +18,8 @@ pub mod scene;
 pub mod selftest;
 pub mod settings;
 pub mod spec;
+mod store;
+pub mod tails;
 #[cfg(feature = "wgpu")]
 mod wgpu;
 

@@ -19,10 +19,12 @@ const MAY_USE: &[(&str, &[&str])] = &[
     ("chart", &[]),
     ("settings", &["error", "layout"]),
     ("mutant", &[]),
-    ("scene", &["error", "mutant"]),
-    ("film", &["error", "layout", "settings"]),
+    ("scene", &["error", "mutant", "store"]),
+    ("tails", &[]),
+    ("film", &["error", "layout", "settings", "tails"]),
     ("image_io", &["error", "fault", "film", "settings"]),
-    ("compare", &["error", "image_io"]),
+    ("store", &["image_io"]),
+    ("compare", &["error", "image_io", "tails"]),
     ("checkpoint", &["error", "film", "image_io", "settings"]),
     ("spec", &["mutant", "scene", "settings"]),
     ("wgpu", &["error", "gpu", "settings"]),
@@ -35,8 +37,8 @@ const MAY_USE: &[(&str, &[&str])] = &[
     (
         "render",
         &[
-            "bvh", "error", "fault", "film", "gpu", "image_io", "layout", "mutant", "scene",
-            "settings", "spec", "wgpu",
+            "bvh", "error", "fault", "film", "gpu", "layout", "mutant", "scene", "settings",
+            "spec", "store", "wgpu",
         ],
     ),
 ];

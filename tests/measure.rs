@@ -15,10 +15,10 @@ mod statistics;
 use std::f64::consts::PI;
 
 use common::*;
-use etendue::compare::tails::student_quantile;
 use etendue::render::{Reading, Tuning};
 use etendue::scene::{LightKind, Material, PunctualLight, Scene};
 use etendue::settings::{Sensor, Settings};
+use etendue::tails::student_quantile;
 use glam::{DVec3, Vec3};
 use statistics::Estimate;
 

@@ -217,7 +217,7 @@ pub struct RenderArgs {
     /// Everything that lowers the error for the time, or the yardstick
     #[arg(long, value_enum, default_value_t = EstimatorName::Full)]
     pub estimator: EstimatorName,
-    /// Keep the tree over the scene's triangles in this folder, so that later renders of them start sooner; safe to delete
+    /// Keep the tree over the scene's triangles and its decoded images in this folder, so that later renders start sooner; safe to delete
     #[arg(long, value_name = "FOLDER")]
     pub cache: Option<PathBuf>,
 

@@ -38,7 +38,12 @@ struct Quantity {
 pub fn run(args: &MeasureArgs) -> Result<Outcome, Failure> {
     let interrupt = Interrupt::install()?;
     let env = args.env.as_deref();
-    let (mut scene, _) = load_scene(&args.scene, env, args.env_intensity, args.env_rotation)?;
+    let (mut scene, _) = load_scene(
+        &args.scene,
+        env,
+        (args.env_intensity, args.env_rotation),
+        None,
+    )?;
     if !args.quiet {
         for warning in &scene.warnings {
             write_stderr(&format!("warning: {warning}"));

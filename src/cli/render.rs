@@ -198,17 +198,19 @@ fn is_exr(path: &Path) -> bool {
 /// The scene with the environment of the command line, and that file's hash.
 fn load(args: &RenderArgs) -> Result<(Scene, Option<String>), Failure> {
     let env = args.env.as_deref();
-    load_scene(&args.scene, env, args.env_intensity, args.env_rotation)
+    let factors = (args.env_intensity, args.env_rotation);
+    load_scene(&args.scene, env, factors, args.cache.as_deref())
 }
 
-/// A scene, with another environment if one is given: its factor, and its rotation in degrees.
+/// A scene, with another environment if one is given: its factor, and its rotation in degrees. `cache` is a folder of images.
 pub fn load_scene(
     scene: &Path,
     env: Option<&Path>,
-    env_intensity: f64,
-    env_rotation: f64,
+    (env_intensity, env_rotation): (f64, f64),
+    cache: Option<&Path>,
 ) -> Result<(Scene, Option<String>), Failure> {
-    let mut scene = gltf::load(scene).map_err(Failure::scene)?;
+    let limits = gltf::Limits::default();
+    let mut scene = gltf::load_cached(scene, &limits, cache).map_err(Failure::scene)?;
     let Some(path) = env else {
         return Ok((scene, None));
     };

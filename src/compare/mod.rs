@@ -20,7 +20,6 @@
 mod metrics;
 mod picture;
 mod side;
-pub mod tails;
 
 pub use metrics::Metrics;
 pub use picture::{difference, signed_picture};
@@ -28,6 +27,7 @@ pub use side::{Side, Source};
 
 use crate::error::{Error, Result};
 use crate::image_io::Image;
+use crate::tails;
 
 /// Side of a tile, pixels.
 pub const TILE: usize = 8;

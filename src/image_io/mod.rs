@@ -87,6 +87,8 @@ pub enum Aov {
     Coverage,
     /// `stderr.R/G/B`: standard error of the radiance; +∞ where unknown (one sample).
     StandardError,
+    /// `interval.R/G/B`: half the width of the 95 % interval around the radiance ([`Film::interval`]).
+    Interval,
     /// `samples`: number of samples.
     Samples,
     /// `dropped`: how many of them were not finite and count as black.
@@ -99,12 +101,13 @@ pub enum Aov {
 
 impl Aov {
     /// Every AOV.
-    pub const ALL: [Self; 9] = [
+    pub const ALL: [Self; 10] = [
         Self::Albedo,
         Self::Normal,
         Self::Depth,
         Self::Coverage,
         Self::StandardError,
+        Self::Interval,
         Self::Samples,
         Self::Dropped,
         Self::Instance,
@@ -119,6 +122,7 @@ impl Aov {
             Self::Depth => "depth",
             Self::Coverage => "coverage",
             Self::StandardError => "stderr",
+            Self::Interval => "interval",
             Self::Samples => "samples",
             Self::Dropped => "dropped",
             Self::Instance => "instance",
@@ -128,7 +132,7 @@ impl Aov {
 
     /// Whether the film must hold the sums that only AOVs need ([`crate::settings::Settings::aovs`]): of the first hit, and of dropped samples.
     pub fn needs_first_hit(self) -> bool {
-        !matches!(self, Self::StandardError | Self::Samples) && !self.is_identity()
+        !matches!(self, Self::StandardError | Self::Interval | Self::Samples) && !self.is_identity()
     }
 
     /// Whether the film knows nothing of it: a number, which no mean can give ([`Image::push_layer`]).
@@ -234,6 +238,7 @@ fn push_aov(channels: &mut Vec<Channel>, film: &Film, aov: Aov) -> Option<()> {
         Aov::Albedo => push_vectors(channels, names(rgb), film.albedo()?),
         Aov::Normal => push_vectors(channels, names(xyz), film.normal()?),
         Aov::StandardError => push_vectors(channels, names(rgb), film.standard_error()),
+        Aov::Interval => push_vectors(channels, names(rgb), film.interval(0.95)),
         Aov::Instance | Aov::Material => return None,
     }
     Some(())

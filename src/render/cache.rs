@@ -1,19 +1,12 @@
-//! Trees that were built before, kept in a folder: one file for each list of triangles and build of this program.
-//! A file that is missing, damaged or of other content costs time only: the tree is then built.
+//! Trees that were built before, kept in a folder: one file for each list of triangles.
 
-use std::fs;
-use std::io::{self, Write};
 use std::path::Path;
-
-use sha2::{Digest, Sha256};
 
 use crate::bvh::{Bvh, GroupDesc, GroupRange, InstanceDesc, Node, Quality, Record};
 use crate::error::Result;
-use crate::image_io::write_with;
+use crate::store::{Entry, Key};
 
-/// Bytes of the digest of all that follows it.
-const DIGEST: usize = 32;
-/// Then the number of nodes, records and groups, and the root.
+/// What a file begins with: the number of nodes, records and groups, and the root.
 type Head = [u64; 4];
 /// A group, in the order of the fields of [`GroupRange`].
 type Group = [u32; 4];
@@ -28,48 +21,34 @@ pub(super) fn tree(
     let Some(folder) = folder else {
         return Bvh::build(groups, instances, quality);
     };
-    let path = folder.join(format!("{}.tree", key(groups, instances, quality)));
-    if let Some(bvh) = read(&path, instances) {
-        tracing::info!(path = %path.display(), "the tree is from the cache");
+    let entry = Entry::new(folder, key(groups, instances, quality));
+    let kept = entry.read();
+    if let Some(bvh) = kept.and_then(|bytes| parse(&bytes, instances)) {
         return Ok(bvh);
     }
     let bvh = Bvh::build(groups, instances, quality)?;
-    let kept = fs::create_dir_all(folder)
-        .map_err(|error| error.to_string())
-        .and_then(|()| {
-            write_with(&path, &mut |file| write(&bvh, file)).map_err(|error| error.to_string())
-        });
-    if let Err(error) = kept {
-        tracing::warn!("the tree is not kept for later renders: {error}");
-    }
+    write(&entry, &bvh);
     Ok(bvh)
 }
 
 /// Names a tree by all that decides it.
-fn key(groups: &[GroupDesc], instances: &[InstanceDesc], quality: Quality) -> String {
-    let mut hash = Sha256::new();
-    hash.update(format!(
-        "{} {quality:?} {}",
-        env!("ETENDUE_BUILD"),
-        groups.len()
-    ));
+fn key(groups: &[GroupDesc], instances: &[InstanceDesc], quality: Quality) -> Key {
+    let mut key = Key::new("tree");
+    key.add(format!("{quality:?}").as_bytes());
     for group in groups {
-        hash.update((group.positions.len() as u64).to_le_bytes());
-        hash.update(bytemuck::cast_slice::<_, u8>(group.positions));
+        key.add(bytemuck::cast_slice(group.positions));
         let masked: Vec<u8> = group.masked.iter().map(|&is| u8::from(is)).collect();
-        hash.update((masked.len() as u64).to_le_bytes());
-        hash.update(masked);
+        key.add(&masked);
     }
     for instance in instances {
-        hash.update(instance.group.to_le_bytes());
-        hash.update(bytemuck::bytes_of(&instance.world_from_object));
-        hash.update(bytemuck::bytes_of(&instance.object_from_world));
+        key.add(&instance.group.to_le_bytes());
+        key.add(bytemuck::bytes_of(&instance.world_from_object));
+        key.add(bytemuck::bytes_of(&instance.object_from_world));
     }
-    let digest = hash.finalize();
-    digest.iter().map(|byte| format!("{byte:02x}")).collect()
+    key
 }
 
-fn write(bvh: &Bvh, file: &mut dyn Write) -> io::Result<()> {
+fn write(entry: &Entry, bvh: &Bvh) {
     let counts = [bvh.nodes.len(), bvh.triangles.len(), bvh.groups.len()];
     let [nodes, records, groups] = counts.map(|count| count as u64);
     let head: Head = [nodes, records, groups, u64::from(bvh.root)];
@@ -78,28 +57,19 @@ fn write(bvh: &Bvh, file: &mut dyn Write) -> io::Result<()> {
         .iter()
         .map(|g| [g.root, g.first_record, g.record_count, g.triangle_count])
         .collect();
-    let parts: [&[u8]; 4] = [
+    entry.write(&[
         bytemuck::bytes_of(&head),
         bytemuck::cast_slice(&groups),
         bytemuck::cast_slice(&bvh.nodes),
         bytemuck::cast_slice(&bvh.triangles),
-    ];
-    let mut hash = Sha256::new();
-    parts.iter().for_each(|part| hash.update(part));
-    file.write_all(&hash.finalize())?;
-    parts.iter().try_for_each(|part| file.write_all(part))
+    ]);
 }
 
-/// `None` for a file that is not there or not what was written.
-fn read(path: &Path, instances: &[InstanceDesc]) -> Option<Bvh> {
-    let bytes = fs::read(path).ok()?;
-    let (digest, rest) = bytes.split_at_checked(DIGEST)?;
-    if digest != Sha256::digest(rest).as_slice() {
-        return None;
-    }
-    let (head, rest) = rest.split_at_checked(size_of::<Head>())?;
+/// `None` for what is not a tree.
+fn parse(bytes: &[u8], instances: &[InstanceDesc]) -> Option<Bvh> {
+    let (head, rest) = bytes.split_at_checked(size_of::<Head>())?;
     let [nodes, records, groups, root] = bytemuck::pod_read_unaligned::<Head>(head);
-    // What has the right digest was written by this build.
+    // What was whole was written by this build.
     let (groups, rest) = rest.split_at_checked(groups as usize * size_of::<Group>())?;
     let (nodes, records_bytes) = rest.split_at_checked(nodes as usize * size_of::<Node>())?;
     if records_bytes.len() != records as usize * size_of::<Record>() {
@@ -142,57 +112,28 @@ mod tests {
         tree(folder, &groups, &instances, Quality::Balanced).unwrap()
     }
 
-    fn files(folder: &Path) -> Vec<std::path::PathBuf> {
-        let entries = fs::read_dir(folder).unwrap();
-        entries.map(|entry| entry.unwrap().path()).collect()
-    }
-
     #[test]
     fn a_kept_tree_is_the_tree() {
         let folder = tempfile::tempdir().unwrap();
-        let folder = folder.path().join("made");
+        let folder = folder.path();
         let positions = corners(100);
         let plain = build(None, &positions, &[]);
-        assert_eq!(build(Some(&folder), &positions, &[]), plain);
+        assert_eq!(build(Some(folder), &positions, &[]), plain);
         // The second one is read: what is in the file is what comes.
-        let [path] = &files(&folder)[..] else {
-            panic!("one file")
-        };
-        assert_eq!(read(path, &plain.instances), Some(plain.clone()));
-        assert_eq!(build(Some(&folder), &positions, &[]), plain);
+        let files = || std::fs::read_dir(folder).unwrap().count();
+        assert_eq!(files(), 1);
+        let groups = [GroupDesc {
+            positions: &positions,
+            masked: &[],
+        }];
+        let entry = Entry::new(folder, key(&groups, &plain.instances, Quality::Balanced));
+        let bytes = entry.read().unwrap();
+        assert_eq!(parse(&bytes, &plain.instances), Some(plain.clone()));
+        assert_eq!(parse(&bytes[1..], &plain.instances), None);
+        assert_eq!(build(Some(folder), &positions, &[]), plain);
         // Other content has another file.
-        build(Some(&folder), &positions, &[true; 100]);
-        build(Some(&folder), &corners(99), &[]);
-        assert_eq!(files(&folder).len(), 3);
-    }
-
-    #[test]
-    fn a_damaged_file_is_written_anew() {
-        let folder = tempfile::tempdir().unwrap();
-        let positions = corners(50);
-        let plain = build(Some(folder.path()), &positions, &[]);
-        let path = files(folder.path()).remove(0);
-        let good = fs::read(&path).unwrap();
-        let mut flipped = good.clone();
-        flipped[good.len() / 2] ^= 1;
-        for bad in [
-            flipped,
-            good[..good.len() - 1].to_vec(),
-            good[..10].to_vec(),
-            Vec::new(),
-        ] {
-            fs::write(&path, bad).unwrap();
-            assert_eq!(read(&path, &plain.instances), None);
-            assert_eq!(build(Some(folder.path()), &positions, &[]), plain);
-            assert_eq!(fs::read(&path).unwrap(), good);
-        }
-    }
-
-    #[test]
-    fn a_folder_that_cannot_be_written_costs_the_cache_only() {
-        let file = tempfile::NamedTempFile::new().unwrap();
-        let positions = corners(10);
-        let plain = build(None, &positions, &[]);
-        assert_eq!(build(Some(file.path()), &positions, &[]), plain);
+        build(Some(folder), &positions, &[true; 100]);
+        build(Some(folder), &corners(99), &[]);
+        assert_eq!(files(), 3);
     }
 }

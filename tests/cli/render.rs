@@ -122,10 +122,8 @@ fn a_kept_tree_changes_no_pixel() {
     // What is damaged is built, and what cannot be kept is said.
     fs::write(trees.join(name), "damaged").unwrap();
     assert!(pixels("d.exr", "--cache kept/trees") == plain);
-    let output = render(
-        &folder,
-        "-o e.exr --spp 4 --width 16 --backend bvh --cache scene.gltf",
-    );
+    let folder_is_a_file = "-o e.exr --spp 4 --width 16 --backend bvh --cache scene.gltf";
+    let output = render(&folder, folder_is_a_file);
     let messages = stderr(&output);
     assert!(
         messages.contains("not kept for later renders"),

@@ -6,8 +6,8 @@
 //! 0.123`), and the night asks whether all of them together are uniform.
 #![allow(dead_code, reason = "each test program uses a part")]
 
-use etendue::compare::tails::{ln_gamma, share_of, student, student_quantile};
 use etendue::film::Film;
+use etendue::tails::{ln_gamma, share_of, student, student_quantile};
 
 #[path = "../../examples/pi/tail.rs"]
 pub mod tail;

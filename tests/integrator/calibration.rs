@@ -1,9 +1,9 @@
 //! Standard errors are as large as errors: in many renders of one scene with
 //! other samples, pixels stray from the truth as often as they say.
 
-use etendue::compare::tails::student_quantile;
 use etendue::render::{Control, Tuning};
 use etendue::settings::{BackendChoice, Estimator, Settings, Strategy};
+use etendue::tails::student_quantile;
 use glam::{DVec3, Vec3};
 
 use crate::closed::glowing_room;

@@ -1,7 +1,7 @@
 //! Materials, textures and the environment.
 
 use etendue::Error;
-use etendue::scene::gltf::{Limits, load};
+use etendue::scene::gltf::{Limits, load, load_cached};
 use etendue::scene::{
     AlphaMode, Environment, Filter, Scene, Texels, TextureRef, Wrap, load_environment,
 };
@@ -344,6 +344,58 @@ fn an_environment_file_is_loaded_on_its_own() {
     assert!(matches!(load_environment(&path), Err(Error::Image { .. })));
     let absent = folder.path().join("absent.hdr");
     assert!(matches!(load_environment(&absent), Err(Error::Io { .. })));
+}
+
+#[test]
+fn kept_images_are_the_images() {
+    // One image of 16 bits as colours and as data, and one of 8.
+    let wide = image::Rgba([65535_u16, 32768, 1000, 12345]);
+    let wide =
+        image::ImageBuffer::from_fn(3, 2, |x, _| if x == 1 { wide } else { image::Rgba([9; 4]) });
+    let mut asset = textured(json!({
+        "pbrMetallicRoughness": { "baseColorTexture": { "index": 1 }, "metallicRoughnessTexture": { "index": 2 } },
+        "emissiveTexture": { "index": 0 }, "normalTexture": { "index": 0 } }));
+    let png = data_uri(&encode(&image::DynamicImage::ImageRgba16(wide)));
+    let narrow = asset.json["images"][0].clone();
+    asset.set("/images", json!([{ "uri": png }, narrow]));
+    asset.set(
+        "/textures",
+        json!([{ "source": 0 }, { "source": 1 }, { "source": 1, "sampler": 0 }]),
+    );
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("scene.gltf");
+    std::fs::write(&path, asset.to_gltf()).unwrap();
+    let cache = folder.path().join("kept");
+    let load = |cache| {
+        let scene = load_cached(&path, &Limits::default(), cache).unwrap();
+        format!("{:?}", scene.textures)
+    };
+    let plain = load(None);
+    assert!(
+        plain.contains("Rgba16") && plain.contains("Rgba8"),
+        "{plain}"
+    );
+    assert_eq!(load(Some(&cache)), plain);
+    let files = || {
+        std::fs::read_dir(&cache)
+            .unwrap()
+            .map(|file| file.unwrap().path())
+    };
+    assert_eq!(files().count(), 3);
+    assert_eq!(load(Some(&cache)), plain);
+    // What is damaged is decoded; what is exchanged does not fit its image.
+    let paths: Vec<_> = files().collect();
+    std::fs::write(&paths[0], b"damaged").unwrap();
+    assert_eq!(load(Some(&cache)), plain);
+    let contents: Vec<_> = paths
+        .iter()
+        .map(|path| std::fs::read(path).unwrap())
+        .collect();
+    let sizes: Vec<_> = contents.iter().map(Vec::len).collect();
+    let other = sizes.iter().position(|&size| size != sizes[0]).unwrap();
+    std::fs::write(&paths[0], &contents[other]).unwrap();
+    assert_eq!(load(Some(&cache)), plain);
+    assert_eq!(std::fs::read(&paths[0]).unwrap(), contents[0]);
 }
 
 #[test]

@@ -50,7 +50,7 @@ pub fn run(args: &BenchArgs) -> Result<Outcome, Failure> {
     let mut scenes = Vec::new();
     for path in &args.scenes {
         let start = Instant::now();
-        let (scene, _) = load_scene(path, None, 1.0, 0.0)?;
+        let (scene, _) = load_scene(path, None, (1.0, 0.0), None)?;
         scenes.push((path, scene, start.elapsed().as_secs_f64()));
     }
     let options = DeviceOptions {

@@ -2,12 +2,14 @@
 //! claims too much is refused before any memory is taken for it.
 
 use std::io::Cursor;
+use std::path::Path;
 
 use image::{DynamicImage, ImageDecoder, ImageFormat, ImageReader};
 
 use super::texture::ColorSpace;
 use super::{Check, quote};
 use crate::scene::Texels;
+use crate::store::{Entry, Key};
 
 /// What the head of an image says.
 #[derive(Clone, Copy)]
@@ -57,8 +59,40 @@ pub(super) fn header(
     })
 }
 
-/// Decodes an image with this head.
-pub(super) fn decode(bytes: &[u8], header: &Header, color_space: ColorSpace) -> Check<Texels> {
+/// The texels of an image with this head; `cache` is a folder of those that were decoded before.
+pub(super) fn texels(
+    bytes: &[u8],
+    header: &Header,
+    color_space: ColorSpace,
+    cache: Option<&Path>,
+) -> Check<Texels> {
+    let Some(folder) = cache else {
+        return decode(bytes, header, color_space);
+    };
+    let srgb = color_space == ColorSpace::Srgb;
+    let mut key = Key::new("texels");
+    key.add(&[u8::from(header.is_wide && srgb)]);
+    key.add(bytes);
+    let entry = Entry::new(folder, key);
+    let count = 4 * header.width as usize * header.height as usize;
+    match entry.read() {
+        Some(data) if !header.is_wide && data.len() == count => {
+            return Ok(Texels::Rgba8 { data, srgb });
+        }
+        Some(data) if header.is_wide && data.len() == 2 * count => {
+            return Ok(Texels::Rgba16(bytemuck::pod_collect_to_vec(&data)));
+        }
+        _ => {}
+    }
+    let texels = decode(bytes, header, color_space)?;
+    match &texels {
+        Texels::Rgba8 { data, .. } => entry.write(&[data]),
+        Texels::Rgba16(data) => entry.write(&[bytemuck::cast_slice(data)]),
+    }
+    Ok(texels)
+}
+
+fn decode(bytes: &[u8], header: &Header, color_space: ColorSpace) -> Check<Texels> {
     // The decoder's own allocations, for bombs in other places than the pixels:
     // sixteen-bit RGBA twice over, and a fixed sum for tables and metadata.
     const DECODER_OVERHEAD: u64 = 1 << 26;

@@ -80,7 +80,12 @@ pub fn load(path: &Path) -> Result<Scene> {
 
 /// Loads a `.gltf` or `.glb` file within the given limits. Errors as for [`load`].
 pub fn load_with(path: &Path, limits: &Limits) -> Result<Scene> {
-    let scene = load_checked(path, limits).map_err(|what| Error::Scene {
+    load_cached(path, limits, None)
+}
+
+/// As [`load_with`], with a folder that keeps decoded images, so that they need not be decoded again; safe to delete.
+pub fn load_cached(path: &Path, limits: &Limits, cache: Option<&Path>) -> Result<Scene> {
+    let scene = load_checked(path, limits, cache).map_err(|what| Error::Scene {
         path: path.to_owned(),
         what,
     })?;
@@ -93,7 +98,7 @@ pub fn load_with(path: &Path, limits: &Limits) -> Result<Scene> {
 /// Inside the loader an error is the text of [`Error::Scene`].
 type Check<T> = std::result::Result<T, String>;
 
-fn load_checked(path: &Path, limits: &Limits) -> Check<Scene> {
+fn load_checked(path: &Path, limits: &Limits, cache: Option<&Path>) -> Check<Scene> {
     let mut warnings = Warnings::default();
     let mut files = resolve::Files::open(path, limits)?;
     let bytes = files.read_scene(path)?;
@@ -123,7 +128,7 @@ fn load_checked(path: &Path, limits: &Limits) -> Check<Scene> {
         meshes: std::mem::take(&mut meshes.list),
         instances,
         materials,
-        textures: textures.finish()?,
+        textures: textures.finish(cache)?,
         lights,
         cameras: view::load(&root, &nodes)?,
         environment,

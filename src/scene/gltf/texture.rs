@@ -3,6 +3,7 @@
 
 use std::borrow::Cow;
 use std::collections::HashMap;
+use std::path::Path;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::thread;
 
@@ -73,9 +74,9 @@ impl<'a> Textures<'a> {
         }
     }
 
-    /// Decodes all images.
-    pub fn finish(mut self) -> Check<Vec<Texture>> {
-        for (pending, texels) in self.pending.iter().zip(decode_all(&self.pending)) {
+    /// Decodes all images; `cache` is a folder of those that were decoded before.
+    pub fn finish(mut self, cache: Option<&Path>) -> Check<Vec<Texture>> {
+        for (pending, texels) in self.pending.iter().zip(decode_all(&self.pending, cache)) {
             let texels = texels.map_err(|what| format!("images[{}]: {what}", pending.image))?;
             self.list[pending.texture].texels = texels;
         }
@@ -230,7 +231,7 @@ impl<'a> Textures<'a> {
 }
 
 /// The texels of each image, in order.
-fn decode_all(images: &[Pending]) -> Vec<Check<Texels>> {
+fn decode_all(images: &[Pending], cache: Option<&Path>) -> Vec<Check<Texels>> {
     let cores = thread::available_parallelism().map_or(1, usize::from);
     let next = AtomicUsize::new(0);
     let work = || -> Vec<_> {
@@ -238,9 +239,8 @@ fn decode_all(images: &[Pending]) -> Vec<Check<Texels>> {
             let index = next.fetch_add(1, Ordering::Relaxed);
             images.get(index).map(|image| (index, image))
         });
-        let decode =
-            |image: &Pending| image::decode(&image.bytes, &image.header, image.color_space);
-        taken.map(|(index, image)| (index, decode(image))).collect()
+        let texels = |p: &Pending| image::texels(&p.bytes, &p.header, p.color_space, cache);
+        taken.map(|(index, image)| (index, texels(image))).collect()
     };
     let mut all: Vec<_> = thread::scope(|scope| {
         let others: Vec<_> = (1..cores.min(images.len()))
