@@ -1,8 +1,8 @@
 //! Intervals that hold the truth as often as they say. A standard error from few parts is itself uncertain, and where
 //! rare samples carry much of the light it is small in most pixels and large in a few. So the relative variance of
-//! the pixels around counts as one more degree of freedom, as the prior of \[Smyth04\]:
+//! pixels around that look alike counts as one more degree of freedom, as the prior of \[Smyth04\]:
 //!
-//! s² = (ν s₀² + r m²) / (ν + 1), r = Σ s₀² / Σ m² over the neighbourhood,
+//! s² = (ν s₀² + r m²) / (ν + 1), r = Σ s₀² / Σ m² over the pixels alike,
 //!
 //! for a mean m with s₀², its squared standard error from the ν + 1 parts of the pixel alone. The interval is that of
 //! Student's t with ν + 1 degrees of freedom.
@@ -10,17 +10,21 @@
 //! References: \[Smyth04\] G. K. Smyth: Linear models and empirical Bayes methods for assessing differential
 //! expression in microarray experiments, Statistical Applications in Genetics and Molecular Biology 3 (2004).
 
+use std::ops::Range;
+
 use super::Film;
 use crate::tails::student_quantile;
 
-/// Pixels to each side that belong to the neighbourhood.
+/// Pixels to each side that may be asked.
 const REACH: usize = 4;
-/// Degrees of freedom that it counts for.
+/// Pixels are alike whose brightness differs by no more than this part of the larger one.
+const LIKENESS: f64 = 0.3;
+/// Degrees of freedom that they count for.
 const WEIGHT: f64 = 1.0;
 
 impl Film {
     /// Half the width of the intervals around [`Film::mean`] that hold the expected value with this `confidence`, such
-    /// as 0.95, cd/m² per channel. Near the borders of a window the neighbourhood is smaller. With fewer than two samples nothing is known, and it is +∞.
+    /// as 0.95, cd/m² per channel. Near the borders of a window fewer pixels are asked. With fewer than two samples nothing is known, and it is +∞.
     ///
     /// # Panics
     /// `confidence` is not between 0 and 1.
@@ -40,56 +44,73 @@ impl Film {
         let width = (self.window.x1 - self.window.x0) as usize;
         let mut half = vec![[0.0; 3]; self.pixels()];
         for channel in 0..3 {
-            let squares = |(mean, error): &([f64; 3], [f64; 3])| {
-                [
-                    error[channel] * error[channel],
-                    mean[channel] * mean[channel],
-                ]
-            };
-            let own: Vec<[f64; 2]> = moments.iter().map(squares).collect();
-            let around = sums_around(&own, width);
-            for ((half, own), around) in half.iter_mut().zip(&own).zip(&around) {
-                let prior = if around[1] > 0.0 {
-                    around[0] / around[1] * own[1]
-                } else {
-                    own[0]
-                };
-                let variance = (degrees * own[0] + WEIGHT * prior) / (degrees + WEIGHT);
-                half[channel] = (quantile * variance.sqrt()) as f32;
+            let own: Vec<Moments> = moments
+                .iter()
+                .map(|(mean, error)| Moments {
+                    mean: mean[channel],
+                    variance: error[channel] * error[channel],
+                })
+                .collect();
+            let brightness = medians(&own, width);
+            for (pixel, half) in half.iter_mut().enumerate() {
+                let Moments { mean, variance } = own[pixel];
+                let prior = relative_variance(&own, &brightness, width, pixel) * mean * mean;
+                let moderated = (degrees * variance + WEIGHT * prior) / (degrees + WEIGHT);
+                half[channel] = (quantile * moderated.sqrt()) as f32;
             }
         }
         half
     }
 }
 
-/// Sums over the neighbourhood of each pixel, the pixel itself included.
-fn sums_around(values: &[[f64; 2]], width: usize) -> Vec<[f64; 2]> {
-    let height = values.len() / width;
-    let rows = sums_along(values, width, height, 1, width);
-    sums_along(&rows, height, width, width, 1)
+/// Of a pixel in one channel.
+#[derive(Clone, Copy)]
+struct Moments {
+    mean: f64,
+    /// Of the mean.
+    variance: f64,
 }
 
-/// Sums over neighbours in one direction: of `count` in a line with this `step`, for so many lines with this `line` between them.
-fn sums_along(
-    values: &[[f64; 2]],
-    count: usize,
-    lines: usize,
-    step: usize,
-    line: usize,
-) -> Vec<[f64; 2]> {
-    let mut sums = vec![[0.0; 2]; values.len()];
-    for start in (0..lines).map(|l| l * line) {
-        for i in 0..count {
-            // Added anew for each, so that nothing of a bright pixel is left in sums that it is no part of.
-            let near = i.saturating_sub(REACH)..(i + REACH + 1).min(count);
-            let sum = &mut sums[start + i * step];
-            for value in near.map(|n| values[start + n * step]) {
-                sum[0] += value[0];
-                sum[1] += value[1];
+/// Medians of the means of 3 × 3 pixels: brightness that single bright pixels do not change.
+fn medians(own: &[Moments], width: usize) -> Vec<f64> {
+    let mut near = Vec::with_capacity(9);
+    let median = |pixel| {
+        near.clear();
+        for row in rows_around(pixel, width, own.len(), 1) {
+            near.extend(own[row].iter().map(|moments| moments.mean));
+        }
+        near.sort_unstable_by(f64::total_cmp);
+        near[near.len() / 2]
+    };
+    (0..own.len()).map(median).collect()
+}
+
+/// Variance over squared mean of the pixels around that look alike, the pixel itself included; 0 where all is black.
+fn relative_variance(own: &[Moments], brightness: &[f64], width: usize, pixel: usize) -> f64 {
+    let this = brightness[pixel];
+    let (mut variance, mut square) = (0.0, 0.0);
+    for row in rows_around(pixel, width, own.len(), REACH) {
+        for (moments, &other) in own[row.clone()].iter().zip(&brightness[row]) {
+            if (other - this).abs() <= LIKENESS * other.abs().max(this.abs()) {
+                variance += moments.variance;
+                square += moments.mean * moments.mean;
             }
         }
     }
-    sums
+    if square > 0.0 { variance / square } else { 0.0 }
+}
+
+/// The pixels of a picture that are at most `reach` away along each axis, row by row, the pixel itself included.
+fn rows_around(
+    pixel: usize,
+    width: usize,
+    count: usize,
+    reach: usize,
+) -> impl Iterator<Item = Range<usize>> {
+    let near = |at: usize, end: usize| at.saturating_sub(reach)..(at + reach + 1).min(end);
+    let columns = near(pixel % width, width);
+    near(pixel / width, count / width)
+        .map(move |row| row * width + columns.start..row * width + columns.end)
 }
 
 #[cfg(test)]
@@ -140,25 +161,26 @@ mod tests {
     }
 
     #[test]
-    fn neighbours_lend_their_relative_variance() {
-        // Two samples: only the pixel in the middle of 11 × 11 differs from one to the other.
+    fn neighbours_that_look_alike_lend_their_relative_variance() {
+        // Two samples: only the pixel in the middle of 11 × 11 differs from one to the other. Half of the picture is dark.
         let (middle, side) = (5 * 11 + 5, 11);
-        let value = |sample: u64, pixel: usize| match pixel == middle {
-            true => 1.0 + sample as f32,
-            false => 2.0,
+        let value = |sample: u64, pixel: usize| match pixel {
+            _ if pixel == middle => 1.0 + sample as f32,
+            _ if pixel % 11 > 7 => 0.5,
+            _ => 2.0,
         };
         let half = film([side, side], 2, value).interval(0.95);
         let quantile = student_quantile(0.05, 2.0);
-        // Its mean is 1.5 and its squared standard error 1/4; 81 pixels are around it.
-        let relative = |neighbours: f64| 0.25 / (1.5 * 1.5 + 4.0 * (neighbours - 1.0));
-        let own = quantile * ((0.25 + relative(81.0) * 2.25) / 2.0).sqrt();
+        // Its mean is 1.5 and its squared standard error 1/4. Of the 81 pixels around 63 are bright.
+        let relative = |bright: f64| 0.25 / (1.5 * 1.5 + 4.0 * (bright - 1.0));
+        let own = quantile * ((0.25 + relative(63.0) * 2.25) / 2.0).sqrt();
         assert!((f64::from(half[middle][1]) / own - 1.0).abs() < 1e-6);
-        // A pixel four to the left and four up has nine less in each direction that leaves the picture.
+        // Four to the left and four up, 6 × 6 pixels are near enough and in the picture.
         let corner = quantile * (relative(6.0 * 6.0) * 4.0 / 2.0).sqrt();
         let found = f64::from(half[11 + 1][1]);
         assert!((found / corner - 1.0).abs() < 1e-6, "{found} {corner}");
-        // and beyond the reach nothing is known to vary
-        assert_eq!(half[0], [0.0; 3]);
+        // Nothing is known to vary beyond the reach, nor where it is dark.
+        assert_eq!([half[0], half[middle + 3]], [[0.0; 3]; 2]);
     }
 
     #[test]
