@@ -41,6 +41,7 @@ validate_shaders() {
         # devices of wgpu have no scalar layout
         case "$file" in
         */path_wgpu.spv) spirv-val --target-env vulkan1.1 "$file" || return 1 ;;
+        */path_wgpu_query.spv) spirv-val --target-env vulkan1.2 "$file" || return 1 ;;
         *) spirv-val --target-env vulkan1.2 --scalar-block-layout "$file" || return 1 ;;
         esac
         count=$((count + 1))

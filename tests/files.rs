@@ -181,7 +181,12 @@ fn films_become_layers() {
     for (name, values) in expected {
         assert_eq!(back.channel(name).unwrap(), values, "{name}");
     }
-    assert_eq!(back.channels.len(), 3 + 3 + 3 + 1 + 1 + 3 + 1 + 1);
+    // Student's t with two degrees of freedom: 4.3027 in tables
+    let interval = back.channel("interval.R").unwrap();
+    let is_near = |(half, expected): (&f32, f32)| (half / expected - 1.0).abs() < 1e-4;
+    let expected = [0.5 * 4.3027, 5.0 * 4.3027];
+    assert!(interval.iter().zip(expected).all(is_near), "{interval:?}");
+    assert_eq!(back.channels.len(), 3 + 3 + 3 + 1 + 1 + 3 + 3 + 1 + 1);
 
     let bare = Film::new(window, (4, 2), false);
     assert!(Image::from_film(&bare, &[Aov::Albedo], Metadata::new()).is_err());
