@@ -232,7 +232,11 @@ impl<'a> Textures<'a> {
 
 /// The texels of each image, in order.
 fn decode_all(images: &[Pending], cache: Option<&Path>) -> Vec<Check<Texels>> {
-    let cores = thread::available_parallelism().map_or(1, usize::from);
+    // Asking for the number of cores opens files of the system, so only where it matters.
+    let workers = match images.len() {
+        0 | 1 => 1,
+        many => thread::available_parallelism().map_or(1, |cores| cores.get().min(many)),
+    };
     let next = AtomicUsize::new(0);
     let work = || -> Vec<_> {
         let taken = std::iter::from_fn(|| {
@@ -243,9 +247,7 @@ fn decode_all(images: &[Pending], cache: Option<&Path>) -> Vec<Check<Texels>> {
         taken.map(|(index, image)| (index, texels(image))).collect()
     };
     let mut all: Vec<_> = thread::scope(|scope| {
-        let others: Vec<_> = (1..cores.min(images.len()))
-            .map(|_| scope.spawn(work))
-            .collect();
+        let others: Vec<_> = (1..workers).map(|_| scope.spawn(work)).collect();
         let mut all = work();
         for other in others {
             // A decoder that panics in a thread panics here.
