@@ -13,14 +13,24 @@ uvec2 kernel_place(uint i)
     return uvec2((i & 3u) | (i >> 1u & 4u), (i >> 2u & 1u) | (i >> 3u & 6u));
 }
 
-// Tile of work group i, or NONE. Tiles are dealt out like cards to
-// `interleave` workers, since lavapipe gives each thread one contiguous run of
-// work groups and neighbouring tiles cost alike.
-uint kernel_tile(uint i)
+// The pixel that the invocation takes next, counted tile by tile through the batch, or NONE. CPU drivers settle beforehand which
+// work groups a thread gets: there few groups take pixels one by one, so that no thread waits for another.
+uint kernel_take(bool is_first)
 {
-    uint rows = (batch.tile_count + batch.interleave - 1u) / batch.interleave;
-    uint k = (i % rows) * batch.interleave + i / rows;
-    return k < batch.tile_count ? batch.first_tile + k : NONE;
+    uint k = NONE;
+    if (batch.is_shared != 0u) {
+        k = atomicAdd(ledger[LEDGER_TAKEN], 1u);
+    } else if (is_first) {
+        k = INVOCATION_GROUP * invocation_group() + invocation_place();
+    }
+    return k < TILE * TILE * batch.tile_count ? k : NONE;
+}
+
+// Where that pixel is in the window.
+uvec2 kernel_pixel(uint k)
+{
+    uint tile = batch.first_tile + k / (TILE * TILE);
+    return TILE * uvec2(tile % params.tiles_x, tile / params.tiles_x) + kernel_place(k % (TILE * TILE));
 }
 
 // Adds to a counter of two words, the low one first.
@@ -32,9 +42,10 @@ void ledger_add(uint low, uint amount)
     }
 }
 
-// The path of sample i of the batch.
-PathState kernel_start(uint i, uvec2 pixel)
+// The path of sample i of the batch at a pixel of the window.
+PathState kernel_start(uint i, uvec2 at)
 {
+    uvec2 pixel = uvec2(params.window_x, params.window_y) + at;
     // Batches are aligned, so the low word does not overflow within one.
     uvec4 key = rng_key(uvec2(params.seed_low, params.seed_high), pixel.y * params.width + pixel.x,
                         batch.first_sample_low + i, batch.first_sample_high);
@@ -43,15 +54,9 @@ PathState kernel_start(uint i, uvec2 pixel)
 
 void main()
 {
-    uint tile = kernel_tile(invocation_group());
-    if (tile == NONE) {
+    if (batch.sample_count == 0u) {
         return;
     }
-    uvec2 at = TILE * uvec2(tile % params.tiles_x, tile / params.tiles_x) + kernel_place(invocation_place());
-    if (at.x >= params.window_width || at.y >= params.window_height) {
-        return;
-    }
-    uvec2 pixel = uvec2(params.window_x, params.window_y) + at;
     trace_start();
     FilmNode levels[FILM_LEVELS];
     uint rays = 0u;
@@ -59,11 +64,17 @@ void main()
     // rounded for each sample, so that the sum is the same however samples are split
     uint truncated_throughput = 0u;
     uint non_finite = 0u;
-    PathState path = kernel_start(0u, pixel);
-    PathResult result = path_result();
+    PathResult result;
+    PathState path;
+    path.is_alive = false;
+    path.shadow.is_waiting = false;
+    // Of the sample that is being taken. Before the first pixel all of the one before it are.
+    uint i = batch.sample_count;
+    uvec2 at;
+    bool is_first = true;
     // A lane whose path has ended starts its next sample at once, or waits for its subgroup: the
     // bits are the same, the host measures which is faster.
-    for (uint i = 0u; i < batch.sample_count;) {
+    while (true) {
         if (path_goes_on(path)) {
             path_step(path, result);
         }
@@ -71,35 +82,46 @@ void main()
         if (batch.is_together != 0u ? invocation_any(goes_on) : goes_on) {
             continue;
         }
-        rays += result.rays;
-        truncated += result.truncated > 0.0 ? 1u : 0u;
-        truncated_throughput += uint(result.truncated * 65536.0 + 0.5);
-        bool is_dropped = !is_finite(result.radiance);
-        non_finite += is_dropped ? 1u : 0u;
+        if (i < batch.sample_count) {
+            rays += result.rays;
+            truncated += result.truncated > 0.0 ? 1u : 0u;
+            truncated_throughput += uint(result.truncated * 65536.0 + 0.5);
+            bool is_dropped = !is_finite(result.radiance);
+            non_finite += is_dropped ? 1u : 0u;
 
-        FilmNode node = FilmNode(is_dropped ? vec3(0.0) : result.radiance, vec3(0.0), result.first.albedo, result.first.normal,
-                                 result.first.depth, result.first.coverage, is_dropped ? 1.0 : 0.0);
-        // A binary counter: each set bit of i is a finished sibling. The bounds
-        // are constant so that the levels stay in registers.
-        uint block = HAS_STRATA ? rng_block_level(batch.first_sample_low + i, batch.first_sample_high) : NONE;
-        for (uint level = 0u; level < FILM_LEVELS; level++) {
-            if ((i >> level & 1u) == 0u) {
-                levels[level] = node;
+            FilmNode node = FilmNode(is_dropped ? vec3(0.0) : result.radiance, vec3(0.0), result.first.albedo,
+                                     result.first.normal, result.first.depth, result.first.coverage, is_dropped ? 1.0 : 0.0);
+            // A binary counter: each set bit of i is a finished sibling. The bounds
+            // are constant so that the levels stay in registers.
+            uint block = HAS_STRATA ? rng_block_level(batch.first_sample_low + i, batch.first_sample_high) : NONE;
+            for (uint level = 0u; level < FILM_LEVELS; level++) {
+                if ((i >> level & 1u) == 0u) {
+                    levels[level] = node;
+                    break;
+                }
+                node = film_merge(levels[level], node, float(1u << level), level == block);
+            }
+            i++;
+            if (i == batch.sample_count) {
+                // a power of two: the last node holds all
+                film_write(at.y * params.window_width + at.x - batch.film_first_pixel, node);
+            }
+        }
+        if (i == batch.sample_count) {
+            uint k = kernel_take(is_first);
+            if (k == NONE) {
                 break;
             }
-            node = film_merge(levels[level], node, float(1u << level), level == block);
+            is_first = false;
+            at = kernel_pixel(k);
+            if (at.x >= params.window_width || at.y >= params.window_height) {
+                continue;
+            }
+            i = 0u;
         }
-        i++;
-        path = kernel_start(i, pixel);
+        path = kernel_start(i, at);
         result = path_result();
     }
-    FilmNode root = levels[0];
-    for (uint level = 1u; level < FILM_LEVELS; level++) {
-        if ((batch.sample_count >> level) != 0u) {
-            root = levels[level];
-        }
-    }
-    film_write(at.y * params.window_width + at.x - batch.film_first_pixel, root);
 
     if (truncated != 0u) {
         atomicAdd(ledger[LEDGER_TRUNCATED], truncated);

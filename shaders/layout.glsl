@@ -61,7 +61,7 @@ struct Batch {
     uint sample_count;       // a power of two that divides the first sample's index
     uint first_tile;         // tiles run row by row through the window
     uint tile_count;
-    uint interleave;         // tiles are dealt out to this many workers
+    uint is_shared;          // 1: invocations take pixels until none is left; 0: each has one
     uint film_first_pixel;   // the film buffer starts at this pixel of the window
     uint is_together;        // 1: the lanes of a subgroup start their samples together
 };
@@ -302,7 +302,9 @@ const uint LEDGER_NODES_LOW = 7u;
 const uint LEDGER_RECORDS_LOW = 9u;
 const uint LEDGER_STEPS_LOW = 11u;
 const uint LEDGER_LANES_LOW = 13u;
-const uint LEDGER_SIZE = 15u;
+// Pixels of the batch that have been taken, where they are shared; the host clears it before.
+const uint LEDGER_TAKEN = 15u;
+const uint LEDGER_SIZE = 16u;
 
 const uint TILE = 8u;
 // log₂ of the samples of the first blocks, and of the largest, with HAS_STRATA; see rng_block_level.

@@ -81,7 +81,7 @@ shared! {
         sample_count: u32,
         first_tile: u32,
         tile_count: u32,
-        interleave: u32,
+        is_shared: u32,
         film_first_pixel: u32,
         is_together: u32,
     }
@@ -266,7 +266,8 @@ tags! {
     LEDGER_RECORDS_LOW = 9;
     LEDGER_STEPS_LOW = 11;
     LEDGER_LANES_LOW = 13;
-    LEDGER_SIZE = 15;
+    LEDGER_TAKEN = 15;
+    LEDGER_SIZE = 16;
     TILE = 8;
     BLOCK_LEVEL = 4;
     MAX_BLOCK_LEVEL = 8;

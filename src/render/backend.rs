@@ -62,6 +62,10 @@ pub(super) struct Band {
     pub pixels: Range<u32>,
 }
 
+/// Work groups that share the pixels of a batch on CPUs, whose drivers divide groups among their threads beforehand: more than
+/// there are threads. The last ones find nothing to do.
+const SHARERS: u32 = 64;
+
 /// Some tiles, an aligned power of two of samples.
 pub(super) struct Batch {
     pub first_sample: u64,
@@ -73,8 +77,8 @@ pub(super) struct Batch {
 }
 
 impl Batch {
-    /// The push constants, and the number of work groups.
-    pub fn push(&self, workers: u32) -> (layout::Batch, u32) {
+    /// The push constants, and the number of work groups, which may share the pixels.
+    pub fn push(&self, is_shared: bool) -> (layout::Batch, u32) {
         let count = self.tiles.len() as u32;
         let push = layout::Batch {
             first_sample_low: self.first_sample as u32,
@@ -82,11 +86,11 @@ impl Batch {
             sample_count: self.samples,
             first_tile: self.tiles.start,
             tile_count: count,
-            interleave: workers,
+            is_shared: u32::from(is_shared),
             film_first_pixel: self.film_first_pixel,
             is_together: u32::from(self.is_together),
         };
-        (push, count.div_ceil(workers) * workers)
+        (push, if is_shared { SHARERS } else { count })
     }
 }
 
@@ -154,13 +158,4 @@ pub(super) fn read_ledger(words: &[u32]) -> (u64, Ledger) {
         interior_overflows: word(layout::LEDGER_INTERIOR_OVERFLOWS),
     };
     (pair(layout::LEDGER_RAYS_LOW), ledger)
-}
-
-/// A CPU driver runs its threads on contiguous runs of work groups, so tiles are dealt out to them.
-pub(super) fn workers(is_cpu: bool) -> u32 {
-    if is_cpu {
-        std::thread::available_parallelism().map_or(1, |n| n.get() as u32)
-    } else {
-        1
-    }
 }

@@ -3,7 +3,7 @@
 
 use std::sync::Arc;
 
-use super::backend::{Backend, Batch, Frame, film_bytes, film_floats, read_ledger, workers};
+use super::backend::{Backend, Batch, Frame, film_bytes, film_floats, read_ledger};
 use super::planes::Planes;
 use super::room;
 use super::traversal::{GROUP, Traversal, build_scene, note_roots, note_small, upload_bvh};
@@ -73,7 +73,7 @@ pub(super) struct VulkanBackend {
     ledger: Buffer,
     pipeline: Pipeline,
     set: BindSet,
-    workers: u32,
+    is_shared: bool,
     memory: Memory,
 }
 
@@ -248,7 +248,7 @@ impl VulkanBackend {
             ledger,
             pipeline,
             set,
-            workers: workers(is_cpu),
+            is_shared: is_cpu,
             memory,
         })
     }
@@ -285,7 +285,11 @@ impl Backend for VulkanBackend {
     }
 
     fn render(&mut self, batch: &Batch) -> Result<f64> {
-        let (push, groups) = batch.push(self.workers);
+        let (push, groups) = batch.push(self.is_shared);
+        if self.is_shared {
+            self.ledger
+                .write(4 * u64::from(layout::LEDGER_TAKEN), &[0u32])?;
+        }
         let time = self.device.run("path", |commands| {
             self.traversal
                 .launch(commands, &self.pipeline, &self.set, &push, groups);

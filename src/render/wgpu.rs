@@ -1,7 +1,7 @@
 //! The same batches through wgpu, for comparison: our own tree or the device's ray query, with every array in a
 //! buffer of wgpu's. What differs from `vulkan` is who translates the kernel and who records it.
 
-use super::backend::{Backend, Batch, Frame, film_bytes, film_floats, read_ledger, workers};
+use super::backend::{Backend, Batch, Frame, film_bytes, film_floats, read_ledger};
 use super::traversal::{self, GROUP, build_bvh, note_roots, world_from_object};
 use super::upload::SceneData;
 use super::{Ledger, Memory, Tuning};
@@ -25,7 +25,7 @@ pub(super) struct WgpuBackend {
     film_bytes: u64,
     ledger: Buffer,
     spec: Spec,
-    workers: u32,
+    is_shared: bool,
     memory: Memory,
 }
 
@@ -118,7 +118,7 @@ impl WgpuBackend {
             film_bytes,
             ledger,
             spec,
-            workers: workers(is_cpu),
+            is_shared: is_cpu,
             memory,
         })
     }
@@ -133,7 +133,7 @@ impl Backend for WgpuBackend {
         self.params.seed_low = seed as u32;
         self.params.seed_high = (seed >> 32) as u32;
         self.device
-            .write(&self.params_buffer, bytes(&[self.params]));
+            .write(&self.params_buffer, 0, bytes(&[self.params]));
         Ok(())
     }
 
@@ -146,7 +146,11 @@ impl Backend for WgpuBackend {
     }
 
     fn render(&mut self, batch: &Batch) -> Result<f64> {
-        let (push, groups) = batch.push(self.workers);
+        let (push, groups) = batch.push(self.is_shared);
+        if self.is_shared {
+            let taken = 4 * u64::from(layout::LEDGER_TAKEN);
+            self.device.write(&self.ledger, taken, bytes(&[0u32]));
+        }
         self.device.run(&self.kernel, bytes(&[push]), groups)
     }
 
@@ -159,7 +163,7 @@ impl Backend for WgpuBackend {
 
     fn reset_ledger(&self) -> Result<()> {
         let zeros = [0u32; layout::LEDGER_SIZE as usize];
-        self.device.write(&self.ledger, bytes(&zeros));
+        self.device.write(&self.ledger, 0, bytes(&zeros));
         Ok(())
     }
 
