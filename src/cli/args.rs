@@ -1,7 +1,7 @@
 //! What can be typed. Turning it into settings is `render.rs`'s part.
 
 use std::ops::Range;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::builder::PossibleValuesParser;
 use clap::{ArgAction, Args, Parser, Subcommand, ValueEnum};
@@ -273,6 +273,11 @@ impl RenderArgs {
     pub fn aovs(&self) -> Vec<Aov> {
         let asked = |aov: &Aov| self.aov.iter().any(|name| name == aov.name());
         Aov::ALL.into_iter().filter(asked).collect()
+    }
+
+    /// The folder in which trees and images are kept; a dry run leaves nothing there.
+    pub fn cache(&self) -> Option<&Path> {
+        self.cache.as_deref().filter(|_| !self.dry_run)
     }
 
     /// The tone curve asked for.

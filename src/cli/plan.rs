@@ -2,6 +2,7 @@
 
 use std::fs;
 use std::ops::Range;
+use std::path::Path;
 
 use etendue::film::Film;
 use etendue::render::{self, DeviceInfo, DeviceOptions};
@@ -50,7 +51,7 @@ pub fn check_host(settings: &Settings) -> Result<()> {
 pub fn devices(args: &RenderArgs) -> Result<Vec<DeviceOptions>> {
     let options = |device: Option<String>| DeviceOptions {
         device,
-        cache: args.cache.clone(),
+        cache: args.cache().map(Path::to_path_buf),
         ..DeviceOptions::default()
     };
     let Some(text) = &args.device else {

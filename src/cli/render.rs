@@ -199,7 +199,7 @@ fn is_exr(path: &Path) -> bool {
 fn load(args: &RenderArgs) -> Result<(Scene, Option<String>), Failure> {
     let env = args.env.as_deref();
     let factors = (args.env_intensity, args.env_rotation);
-    load_scene(&args.scene, env, factors, args.cache.as_deref())
+    load_scene(&args.scene, env, factors, args.cache())
 }
 
 /// A scene, with another environment if one is given: its factor, and its rotation in degrees. `cache` is a folder of images.

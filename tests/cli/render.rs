@@ -114,6 +114,9 @@ fn a_kept_tree_changes_no_pixel() {
         read(&folder, name).channels
     };
     let plain = pixels("a.exr", "");
+    let line = "render scene.gltf -o b.exr --width 16 --backend bvh --cache kept/trees --dry-run";
+    assert!(etendue(line, folder.path()).status.success());
+    assert!(!trees.exists(), "a dry run writes nothing");
     assert!(pixels("b.exr", "--cache kept/trees") == plain);
     let [name] = &list(&trees)[..] else {
         panic!("one file: {:?}", list(&trees));
