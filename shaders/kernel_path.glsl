@@ -105,6 +105,13 @@ void main()
             if (i == batch.sample_count) {
                 // a power of two: the last node holds all
                 film_write(at.y * params.window_width + at.x - batch.film_first_pixel, node);
+                // in 32 bits for a pixel, whose samples are few
+                if (truncated != 0u) {
+                    atomicAdd(ledger[LEDGER_TRUNCATED], truncated);
+                    ledger_add(LEDGER_THROUGHPUT_LOW, truncated_throughput);
+                    truncated = 0u;
+                    truncated_throughput = 0u;
+                }
             }
         }
         if (i == batch.sample_count) {
@@ -123,10 +130,6 @@ void main()
         result = path_result();
     }
 
-    if (truncated != 0u) {
-        atomicAdd(ledger[LEDGER_TRUNCATED], truncated);
-        ledger_add(LEDGER_THROUGHPUT_LOW, truncated_throughput);
-    }
     if (non_finite != 0u) {
         atomicAdd(ledger[LEDGER_NON_FINITE], non_finite);
     }
