@@ -19,7 +19,7 @@ uint kernel_take(bool is_first)
 {
     uint k = NONE;
     if (batch.is_shared != 0u) {
-        k = atomicAdd(ledger[LEDGER_TAKEN], 1u);
+        k = atomicAdd(ledger[LEDGER_TAKEN], 1u) - batch.taken;
     } else if (is_first) {
         k = INVOCATION_GROUP * invocation_group() + invocation_place();
     }

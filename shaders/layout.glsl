@@ -64,6 +64,7 @@ struct Batch {
     uint is_shared;          // 1: invocations take pixels until none is left; 0: each has one
     uint film_first_pixel;   // the film buffer starts at this pixel of the window
     uint is_together;        // 1: the lanes of a subgroup start their samples together
+    uint taken;              // LEDGER_TAKEN before
 };
 
 // --- Geometry ----------------------------------------------------------------
@@ -302,7 +303,7 @@ const uint LEDGER_NODES_LOW = 7u;
 const uint LEDGER_RECORDS_LOW = 9u;
 const uint LEDGER_STEPS_LOW = 11u;
 const uint LEDGER_LANES_LOW = 13u;
-// Pixels of the batch that have been taken, where they are shared; the host clears it before.
+// Pixels that have been taken, where they are shared, and one more for each invocation that found none.
 const uint LEDGER_TAKEN = 15u;
 const uint LEDGER_SIZE = 16u;
 

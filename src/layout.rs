@@ -84,6 +84,7 @@ shared! {
         is_shared: u32,
         film_first_pixel: u32,
         is_together: u32,
+        taken: u32,
     }
     Instance {
         world_from_object_x: [f32; 3],

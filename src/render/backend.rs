@@ -1,7 +1,9 @@
 //! What renders batches, on whichever API, and what all of them compute alike.
 
+use std::cell::Cell;
 use std::ops::Range;
 
+use super::traversal::GROUP;
 use super::{Ledger, Memory, TraversalCounts};
 use crate::error::Result;
 use crate::layout::{self, ProbeHit, ProbeRay};
@@ -77,8 +79,8 @@ pub(super) struct Batch {
 }
 
 impl Batch {
-    /// The push constants, and the number of work groups, which may share the pixels.
-    pub fn push(&self, is_shared: bool) -> (layout::Batch, u32) {
+    /// The push constants, and the number of work groups. Where these share the pixels, `taken` counts what they take.
+    pub fn push(&self, taken: Option<&Cell<u32>>) -> (layout::Batch, u32) {
         let count = self.tiles.len() as u32;
         let push = layout::Batch {
             first_sample_low: self.first_sample as u32,
@@ -86,11 +88,20 @@ impl Batch {
             sample_count: self.samples,
             first_tile: self.tiles.start,
             tile_count: count,
-            is_shared: u32::from(is_shared),
+            is_shared: u32::from(taken.is_some()),
             film_first_pixel: self.film_first_pixel,
             is_together: u32::from(self.is_together),
+            taken: taken.map_or(0, Cell::get),
         };
-        (push, if is_shared { SHARERS } else { count })
+        let Some(taken) = taken else {
+            return (push, count);
+        };
+        if self.samples > 0 {
+            // each invocation asks once more than it gets
+            let asked = (count + SHARERS).wrapping_mul(GROUP);
+            taken.set(push.taken.wrapping_add(asked));
+        }
+        (push, SHARERS)
     }
 }
 

@@ -1,6 +1,7 @@
 //! The Vulkan side of a render: buffers, pipeline, batches. What the
 //! traversals do not share is in `traversal`.
 
+use std::cell::Cell;
 use std::sync::Arc;
 
 use super::backend::{Backend, Batch, Frame, film_bytes, film_floats, read_ledger};
@@ -73,7 +74,8 @@ pub(super) struct VulkanBackend {
     ledger: Buffer,
     pipeline: Pipeline,
     set: BindSet,
-    is_shared: bool,
+    /// Pixels that were taken since the ledger was reset, where they are shared.
+    taken: Option<Cell<u32>>,
     memory: Memory,
 }
 
@@ -248,7 +250,7 @@ impl VulkanBackend {
             ledger,
             pipeline,
             set,
-            is_shared: is_cpu,
+            taken: is_cpu.then(Cell::default),
             memory,
         })
     }
@@ -285,11 +287,7 @@ impl Backend for VulkanBackend {
     }
 
     fn render(&mut self, batch: &Batch) -> Result<f64> {
-        let (push, groups) = batch.push(self.is_shared);
-        if self.is_shared {
-            self.ledger
-                .write(4 * u64::from(layout::LEDGER_TAKEN), &[0u32])?;
-        }
+        let (push, groups) = batch.push(self.taken.as_ref());
         let time = self.device.run("path", |commands| {
             self.traversal
                 .launch(commands, &self.pipeline, &self.set, &push, groups);
@@ -304,6 +302,7 @@ impl Backend for VulkanBackend {
     }
 
     fn reset_ledger(&self) -> Result<()> {
+        self.taken.iter().for_each(|taken| taken.set(0));
         self.ledger.write(0, &[0u32; layout::LEDGER_SIZE as usize])
     }
 

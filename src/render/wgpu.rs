@@ -1,6 +1,8 @@
 //! The same batches through wgpu, for comparison: our own tree or the device's ray query, with every array in a
 //! buffer of wgpu's. What differs from `vulkan` is who translates the kernel and who records it.
 
+use std::cell::Cell;
+
 use super::backend::{Backend, Batch, Frame, film_bytes, film_floats, read_ledger};
 use super::traversal::{self, GROUP, build_bvh, note_roots, world_from_object};
 use super::upload::SceneData;
@@ -25,7 +27,8 @@ pub(super) struct WgpuBackend {
     film_bytes: u64,
     ledger: Buffer,
     spec: Spec,
-    is_shared: bool,
+    /// Pixels that were taken since the ledger was reset, where they are shared.
+    taken: Option<Cell<u32>>,
     memory: Memory,
 }
 
@@ -118,7 +121,7 @@ impl WgpuBackend {
             film_bytes,
             ledger,
             spec,
-            is_shared: is_cpu,
+            taken: is_cpu.then(Cell::default),
             memory,
         })
     }
@@ -133,7 +136,7 @@ impl Backend for WgpuBackend {
         self.params.seed_low = seed as u32;
         self.params.seed_high = (seed >> 32) as u32;
         self.device
-            .write(&self.params_buffer, 0, bytes(&[self.params]));
+            .write(&self.params_buffer, bytes(&[self.params]));
         Ok(())
     }
 
@@ -146,11 +149,7 @@ impl Backend for WgpuBackend {
     }
 
     fn render(&mut self, batch: &Batch) -> Result<f64> {
-        let (push, groups) = batch.push(self.is_shared);
-        if self.is_shared {
-            let taken = 4 * u64::from(layout::LEDGER_TAKEN);
-            self.device.write(&self.ledger, taken, bytes(&[0u32]));
-        }
+        let (push, groups) = batch.push(self.taken.as_ref());
         self.device.run(&self.kernel, bytes(&[push]), groups)
     }
 
@@ -162,8 +161,9 @@ impl Backend for WgpuBackend {
     }
 
     fn reset_ledger(&self) -> Result<()> {
+        self.taken.iter().for_each(|taken| taken.set(0));
         let zeros = [0u32; layout::LEDGER_SIZE as usize];
-        self.device.write(&self.ledger, 0, bytes(&zeros));
+        self.device.write(&self.ledger, bytes(&zeros));
         Ok(())
     }
 

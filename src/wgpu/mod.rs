@@ -238,9 +238,9 @@ impl Device {
         Ok(start.elapsed().as_secs_f64())
     }
 
-    /// Overwrites a part of a buffer.
-    pub fn write(&self, buffer: &Buffer, offset: u64, content: &[u8]) {
-        self.queue.write_buffer(buffer, offset, content);
+    /// Overwrites the start of a buffer.
+    pub fn write(&self, buffer: &Buffer, content: &[u8]) {
+        self.queue.write_buffer(buffer, 0, content);
     }
 
     /// Fills `content` with the start of a buffer.
