@@ -18,6 +18,7 @@ const uint FILM_LEVELS = 9u;
 struct FilmNode {
     vec3 sum;        // of radiance
     vec3 m2;         // squared deviations from the node's mean; of blocks where there are two
+    vec3 between;    // what its samples of the first net add up to, less those of the second
     vec3 albedo;     // sums over the first hits
     vec3 normal;
     float depth;
@@ -25,20 +26,24 @@ struct FilmNode {
     float dropped;   // samples
 };
 
-// Two siblings of `count` samples each, the earlier one first; whether each is one block.
-FilmNode film_merge(FilmNode a, FilmNode b, float count, bool are_blocks)
+// Two siblings of 2^level samples each, the earlier one first; level < NET_LEVEL.
+FilmNode film_merge(FilmNode a, FilmNode b, uint level)
 {
     FilmNode r;
+    float count = float(1u << level);
     precise vec3 sum = a.sum + b.sum;
     precise vec3 d = a.sum - b.sum;
     precise vec3 within = a.m2 + b.m2;
-    // Samples of a block are not independent: what counts is how blocks differ.
-    if (are_blocks) {
+    precise vec3 between = a.between + b.between;
+    // Samples of a block are not independent: what counts is how blocks differ. Two siblings are of two nets.
+    if (HAS_STRATA && level == BLOCK_LEVEL) {
         within = vec3(0.0);
+        between = d;
     }
     precise vec3 m2 = within + (d * d) * (1.0 / (2.0 * count));
     r.sum = sum;
     r.m2 = m2;
+    r.between = between;
     if (HAS_AOVS) {
         precise vec3 albedo = a.albedo + b.albedo;
         precise vec3 normal = a.normal + b.normal;
@@ -58,15 +63,16 @@ void film_write(uint pixel, FilmNode node)
     for (uint c = 0u; c < 3u; c++) {
         film[at + c] = node.sum[c];
         film[at + 3u + c] = node.m2[c];
+        film[at + 6u + c] = node.between[c];
         if (HAS_AOVS) {
-            film[at + 6u + c] = node.albedo[c];
-            film[at + 9u + c] = node.normal[c];
+            film[at + 9u + c] = node.albedo[c];
+            film[at + 12u + c] = node.normal[c];
         }
     }
     if (HAS_AOVS) {
-        film[at + 12u] = node.depth;
-        film[at + 13u] = node.coverage;
-        film[at + 14u] = node.dropped;
+        film[at + 15u] = node.depth;
+        film[at + 16u] = node.coverage;
+        film[at + 17u] = node.dropped;
     }
 }
 

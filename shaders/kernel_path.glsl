@@ -89,17 +89,16 @@ void main()
             bool is_dropped = !is_finite(result.radiance);
             non_finite += is_dropped ? 1u : 0u;
 
-            FilmNode node = FilmNode(is_dropped ? vec3(0.0) : result.radiance, vec3(0.0), result.first.albedo,
+            FilmNode node = FilmNode(is_dropped ? vec3(0.0) : result.radiance, vec3(0.0), vec3(0.0), result.first.albedo,
                                      result.first.normal, result.first.depth, result.first.coverage, is_dropped ? 1.0 : 0.0);
             // A binary counter: each set bit of i is a finished sibling. The bounds
             // are constant so that the levels stay in registers.
-            uint block = HAS_STRATA ? rng_block_level(batch.first_sample_low + i, batch.first_sample_high) : NONE;
             for (uint level = 0u; level < FILM_LEVELS; level++) {
                 if ((i >> level & 1u) == 0u) {
                     levels[level] = node;
                     break;
                 }
-                node = film_merge(levels[level], node, float(1u << level), level == block);
+                node = film_merge(levels[level], node, level);
             }
             i++;
             if (i == batch.sample_count) {

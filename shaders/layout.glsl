@@ -282,11 +282,11 @@ struct ProbeHit {
 
 // --- Film ------------------------------------------------------------------------
 
-// Per pixel of the window, FILM_FLOATS (with HAS_AOVS FILM_FLOATS_AOV) floats: sum of radiance and sum of squared
-// deviations from the mean over the batch's samples, then sums of albedo, normal, depth and coverage of the first hit, and
-// the number of samples that were dropped.
-const uint FILM_FLOATS = 6u;
-const uint FILM_FLOATS_AOV = 15u;
+// Per pixel of the window, FILM_FLOATS (with HAS_AOVS FILM_FLOATS_AOV) floats: sum of radiance, sum of squared
+// deviations from the mean over the batch's samples and what the two nets differ by, then sums of albedo, normal, depth
+// and coverage of the first hit, and the number of samples that were dropped.
+const uint FILM_FLOATS = 9u;
+const uint FILM_FLOATS_AOV = 18u;
 // Counters of the ledger.
 const uint LEDGER_NON_FINITE = 0u;
 const uint LEDGER_TRUNCATED = 1u;
@@ -308,9 +308,9 @@ const uint LEDGER_TAKEN = 15u;
 const uint LEDGER_SIZE = 16u;
 
 const uint TILE = 8u;
-// log₂ of the samples of the first blocks, and of the largest, with HAS_STRATA; see rng_block_level.
+// With HAS_STRATA log₂ of the samples of a block, and of those of a whole net; see rng_key.
 const uint BLOCK_LEVEL = 4u;
-const uint MAX_BLOCK_LEVEL = 8u;
+const uint NET_LEVEL = 8u;
 
 // --- Bindings: one descriptor set ---------------------------------------------------
 

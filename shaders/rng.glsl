@@ -2,9 +2,9 @@
 // slot). Dimensions are named, so that switching a feature off shifts none of
 // the others, and any sample can be computed alone.
 //
-// With HAS_STRATA the samples of a block are one net in the four numbers of each slot,
-// scrambled after Owen: every block has scrambles of its own, so that blocks are
-// independent and their spread gives the standard error. Later blocks are larger, up to 256 samples, and err less.
+// With HAS_STRATA two nets in the four numbers of each slot, scrambled after Owen, take turns: sixteen samples are of the
+// one, the next sixteen of the other. Their scrambles are independent, so that what they differ by gives the standard error.
+// After 2^NET_LEVEL samples of each come two others.
 //
 // [Jarzynski20] Jarzynski, Olano, Hash Functions for GPU Rendering, JCGT 9(3): pcg4d.
 // [Owen97] Owen, Scrambled Net Variance for Integrals of Smooth Functions.
@@ -41,33 +41,23 @@ uvec4 rng_pcg4d(uvec4 v)
     return v;
 }
 
-// log₂ of the samples of the aligned block that holds a sample: two blocks of a size, four of the first, then two of the
-// next, so that the samples so far are always some blocks that tell the error (`Film`).
-uint rng_block_level(uint sample_low, uint sample_high)
-{
-#ifdef WGPU
-    // naga takes the result for unsigned where the number is.
-    int level = findMSB(int(sample_low >> 1u));
-#else
-    int level = findMSB(sample_low) - 1;
-#endif
-    return sample_high != 0u ? MAX_BLOCK_LEVEL : uint(clamp(level, int(BLOCK_LEVEL), int(MAX_BLOCK_LEVEL)));
-}
-
 // Key of one pixel sample. `pixel` counts in the full frame, so that crops and
 // shards see the same numbers. The first round spreads the seed and the high
 // half of the sample index over all words. With HAS_STRATA the last word is the
-// sample's place in its block and the others are the block's.
+// sample's place in its net and the others are the net's.
 uvec4 rng_key(uvec2 seed, uint pixel, uint sample_low, uint sample_high)
 {
     uvec4 base = rng_pcg4d(uvec4(seed, sample_high, 0x9E3779B9u));
     if (!HAS_STRATA) {
         return rng_pcg4d(base ^ uvec4(pixel, sample_low, 0u, 0u));
     }
-    uint level = rng_block_level(sample_low, sample_high);
-    uint place = bitfieldExtract(sample_low, 0, int(level));
-    uvec3 block = rng_pcg4d(base ^ uvec4(pixel, sample_low - place, 0u, 0u)).xyz;
-    return uvec4(block, place);
+    // The bit above those of a block tells which of the two nets; the bits above a pair of nets, which pair.
+    const uint WHICH = 1u << BLOCK_LEVEL;
+    const uint PAIR = 2u << NET_LEVEL;
+    uint place = (sample_low & WHICH - 1u) | (sample_low & PAIR - 1u & ~(2u * WHICH - 1u)) >> 1u;
+    uint net = sample_low & (WHICH | ~(PAIR - 1u));
+    uvec3 words = rng_pcg4d(base ^ uvec4(pixel, net, 0u, 0u)).xyz;
+    return uvec4(words, place);
 }
 
 // A nested permutation of the binary digits after the point, chosen by two words for
@@ -82,7 +72,7 @@ uvec4 rng_owen(uvec4 v, uvec4 add, uvec4 factor)
     return bitfieldReverse(v);
 }
 
-// A permutation of the places in a block, chosen by a word, that keeps each run of the first 2^k places together, k ≥ BLOCK_LEVEL,
+// A permutation of the places in a net, chosen by a word, that keeps each run of the first 2^k places together, k ≥ BLOCK_LEVEL,
 // so that they stay a net. The low digits go through steps that carry from low digits
 // to high ones, and are reversed between them, so that no digit leads; each group of 16 has another order.
 uint rng_shuffle(uint place, uint word)
@@ -105,11 +95,11 @@ uint rng_shuffle(uint place, uint word)
 // and, without w, a (0, 4, 3)-net. The first digit after the point is the lowest bit.
 uvec4 rng_net(uint place)
 {
-    const uvec4 columns[MAX_BLOCK_LEVEL] = uvec4[](
+    const uvec4 columns[NET_LEVEL] = uvec4[](
         uvec4(88u, 1u, 1u, 241u), uvec4(100u, 2u, 3u, 244u), uvec4(242u, 4u, 5u, 211u), uvec4(17u, 8u, 15u, 45u),
         uvec4(158u, 16u, 17u, 172u), uvec4(211u, 32u, 51u, 71u), uvec4(185u, 64u, 85u, 9u), uvec4(132u, 128u, 255u, 92u));
     uvec4 v = uvec4(0u);
-    for (uint k = 0u; k < MAX_BLOCK_LEVEL; k++) {
+    for (uint k = 0u; k < NET_LEVEL; k++) {
         v ^= columns[k] * (place >> k & 1u);
     }
     return v;
@@ -128,7 +118,7 @@ vec4 rng_uniform(uvec4 key, uint event, uint slot)
     uint dimension = rng_dimension(event, slot);
     if (HAS_STRATA) {
         uvec4 words = rng_pcg4d(uvec4(key.xy, key.z ^ dimension, 0x85EBCA6Bu));
-        // Slots see the block in orders of their own, so that they do not go together.
+        // Slots see the net in orders of their own, so that they do not go together.
         uint place = rng_shuffle(key.w, words.x ^ words.z) ^ (words.y ^ words.w) >> 24u & 0xF0u;
         bits = rng_owen(rng_net(place), words, words.yzwx);
     } else {

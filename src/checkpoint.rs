@@ -20,7 +20,7 @@ use crate::image_io::{Metadata, Value, write_with};
 use crate::settings::{Crop, MAX_SIDE};
 
 /// Of every checkpoint; the last byte counts up when the format changes.
-const MAGIC: [u8; 16] = *b"etendue\0chkpt\0\0\x03";
+const MAGIC: [u8; 16] = *b"etendue\0chkpt\0\0\x04";
 /// Bytes of a SHA-256.
 const DIGEST: u64 = 32;
 

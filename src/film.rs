@@ -12,13 +12,15 @@
 //! References: \[Chan83\] Chan, Golub, LeVeque: Algorithms for Computing the
 //! Sample Variance, The American Statistician 37 (1983).
 
+mod error;
 mod interval;
 
+use std::cmp::Ordering;
 use std::collections::BTreeMap;
 use std::ops::Range;
 
 use crate::error::{Error, Result};
-use crate::layout::{FILM_FLOATS, FILM_FLOATS_AOV, MAX_BLOCK_LEVEL};
+use crate::layout::{BLOCK_LEVEL, FILM_FLOATS, FILM_FLOATS_AOV, NET_LEVEL};
 use crate::settings::{Crop, Settings};
 
 /// One past the largest sample index, so that ends and node sizes fit 64 bits.
@@ -27,11 +29,12 @@ pub const MAX_SAMPLES: u64 = 1 << 63;
 // Floats of a pixel in a node, in order.
 const RADIANCE: usize = 0;
 const DEVIATIONS: usize = 3;
-const ALBEDO: usize = 6;
-const NORMAL: usize = 9;
-const DEPTH: usize = 12;
-const COVERAGE: usize = 13;
-const DROPPED: usize = 14;
+const BETWEEN: usize = 6;
+const ALBEDO: usize = 9;
+const NORMAL: usize = 12;
+const DEPTH: usize = 15;
+const COVERAGE: usize = 16;
+const DROPPED: usize = 17;
 
 /// A complete node of the tree over sample indices.
 struct Node {
@@ -44,7 +47,7 @@ pub struct Film {
     window: Crop,
     full: (u32, u32),
     aovs: bool,
-    /// log₂ of the samples of the first blocks, whose samples depend on each other; 0: of none.
+    /// log₂ of the samples of a block, whose samples depend on each other; 0: of none.
     block_level: u32,
     /// By first sample; disjoint, and no two siblings of the same level.
     nodes: BTreeMap<u64, Node>,
@@ -62,14 +65,13 @@ pub fn dyadic_pieces(samples: Range<u64>) -> Vec<(u64, u32)> {
     pieces
 }
 
-/// log₂ of the samples of the block that holds a sample, where the first blocks have 2^`first` samples: there are four of
-/// these, then come two of each double size up to 2⁸ (`rng_block_level` in rng.glsl). 0: samples are independent.
-pub(crate) fn block_of(first: u32, sample: u64) -> u32 {
-    if first == 0 {
-        return 0;
+/// log₂ of the samples of a pair of nets in blocks of 2^`block`; 0 where samples are independent, with a `block` of 0.
+pub(crate) fn pair_level(block: u32) -> u32 {
+    if block == 0 {
+        0
+    } else {
+        block + NET_LEVEL - BLOCK_LEVEL + 1
     }
-    let doubled = sample.max(1).ilog2().saturating_sub(1);
-    doubled.clamp(first, MAX_BLOCK_LEVEL.max(first))
 }
 
 impl Film {
@@ -91,56 +93,18 @@ impl Film {
         Self::new(settings.window(), full, settings.aovs).with_blocks(settings.block_level())
     }
 
-    /// An empty film whose samples are independent only from one aligned block to the next, as
-    /// those of scrambled nets, where the first four have 2^`level` samples and later ones more: from
-    /// two whole blocks on the standard error comes from how they differ.
+    /// An empty film of samples of two nets that take turns (`rng_key` in rng.glsl), 2^`level` samples each, and of two
+    /// others after each pair of 2^[`pair_level`] samples. From two whole blocks on the standard error comes from
+    /// what nets and their blocks differ by.
     #[must_use]
     pub fn with_blocks(mut self, level: u32) -> Self {
         self.block_level = level;
         self
     }
 
-    /// log₂ of the samples of the first blocks; 0 where samples are independent.
+    /// log₂ of the samples of a block; 0 where samples are independent.
     pub fn block_level(&self) -> u32 {
         self.block_level
-    }
-
-    /// log₂ of the samples of the block that holds a sample.
-    fn block_of(&self, sample: u64) -> u32 {
-        block_of(self.block_level, sample)
-    }
-
-    /// Number of whole blocks in a node; 0 where it is a part of one.
-    fn whole_blocks(&self, first: u64, level: u32) -> u64 {
-        let block = self.block_of(first);
-        if level < block {
-            0
-        } else if first > 0 || level == block {
-            // All of one size, since sizes change at powers of two.
-            1 << (level - block)
-        } else {
-            self.whole_blocks(0, level - 1) + self.whole_blocks(1 << (level - 1), level - 1)
-        }
-    }
-
-    /// Number of parts that the standard error takes as independent, one more than
-    /// its degrees of freedom: whole blocks and the nodes that are smaller, or
-    /// samples where there are not two whole blocks.
-    pub fn parts(&self) -> u64 {
-        if !self.has_blocks() {
-            return self.samples();
-        }
-        let nodes = self.nodes.iter();
-        nodes
-            .map(|(&first, node)| self.whole_blocks(first, node.level).max(1))
-            .sum()
-    }
-
-    /// Whether there are two blocks to compare.
-    fn has_blocks(&self) -> bool {
-        let nodes = self.nodes.iter();
-        let blocks = nodes.map(|(&first, node)| self.whole_blocks(first, node.level));
-        blocks.sum::<u64>() >= 2
     }
 
     /// The pixels that the film holds.
@@ -229,7 +193,8 @@ impl Film {
     /// Adds the samples first … first + 2^level − 1. `values` holds, for each pixel
     /// of the window row by row, the sum of radiance (3), the sum of squared
     /// deviations from the node's own mean (3; of samples up to a single block, of
-    /// blocks beyond, each counted once for each of its samples) and, with AOVs,
+    /// blocks beyond, each counted once for each of its samples), what the samples of the first net add up to less those of
+    /// the second (3; from a pair of nets on the squared deviations of nets, as above; 0 up to a single block) and, with AOVs,
     /// the sums of albedo (3), normal (3), depth (1) and coverage (1) and the number of dropped samples (1).
     ///
     /// # Errors
@@ -277,38 +242,6 @@ impl Film {
     /// in double precision in sample order, divided, rounded once. Black when empty.
     pub fn mean(&self) -> Vec<[f32; 3]> {
         self.averages(RADIANCE)
-    }
-
-    /// Estimated standard error of [`Film::mean`], cd/m² per channel:
-    /// √(M₂ / (N (G − 1))) for N samples in G parts ([`Film::parts`]), where M₂ is the
-    /// sum of squared deviations of parts, each counted once for each of its samples.
-    /// Below two whole blocks their samples are taken as independent, so the error is
-    /// rather overstated. With fewer than two samples nothing is known, and it is +∞.
-    pub fn standard_error(&self) -> Vec<[f32; 3]> {
-        (0..self.pixels())
-            .map(|pixel| self.moments(pixel).1.map(|e| e as f32))
-            .collect()
-    }
-
-    /// Estimated relative error of the image: the root mean square of the standard
-    /// error over that of the mean, over all pixels and channels of the window.
-    /// 0 for an image without noise (a black one, too), +∞ below two samples.
-    pub fn relative_error(&self) -> f64 {
-        let (mut signal, mut noise) = (0.0, 0.0);
-        for pixel in 0..self.pixels() {
-            let (mean, error) = self.moments(pixel);
-            for channel in 0..3 {
-                signal += mean[channel] * mean[channel];
-                noise += error[channel] * error[channel];
-            }
-        }
-        if noise == 0.0 {
-            0.0
-        } else if noise.is_infinite() {
-            f64::INFINITY
-        } else {
-            (noise / signal).sqrt()
-        }
     }
 
     /// Mean albedo of the first hit for each pixel (0 where nothing was hit); `None` without AOVs.
@@ -402,8 +335,7 @@ impl Film {
             } else {
                 (values, other)
             };
-            let are_blocks = level == self.block_of(first.max(sibling));
-            merge_siblings(&mut values, &right, level, stride, are_blocks);
+            merge_siblings(&mut values, &right, level, stride, self.block_level);
             first = first.min(sibling);
             level += 1;
         }
@@ -430,61 +362,39 @@ impl Film {
         let count = self.samples().max(1) as f64;
         self.map_pixels(|pixel| self.sum(pixel, offset).map(|s: f64| (s / count) as f32))
     }
-
-    /// Mean and standard error of a pixel's radiance.
-    fn moments(&self, pixel: usize) -> ([f64; 3], [f64; 3]) {
-        let start = pixel * self.floats_per_pixel();
-        let (mut n, mut mean, mut m2) = (0.0, [0.0; 3], [0.0; 3]);
-        let has_blocks = self.has_blocks();
-        for (&first, node) in &self.nodes {
-            let count = (1_u64 << node.level) as f64;
-            // Deviations within a block say nothing about how blocks differ.
-            let counts = !has_blocks || node.level > self.block_of(first);
-            for channel in 0..3 {
-                let sum = f64::from(node.values[start + RADIANCE + channel]);
-                let own = f64::from(node.values[start + DEVIATIONS + channel]);
-                let own = if counts { own } else { 0.0 };
-                // [Chan83] Eq. 2.1, written with means instead of sums
-                let delta = sum / count - mean[channel];
-                m2[channel] += own + delta * delta * (n * count / (n + count));
-                mean[channel] += delta * (count / (n + count));
-            }
-            n += count;
-        }
-        let parts = self.parts() as f64;
-        let error = m2.map(|m2| {
-            if parts < 2.0 {
-                f64::INFINITY
-            } else {
-                (m2 / (parts - 1.0) / n).sqrt()
-            }
-        });
-        (mean, error)
-    }
 }
 
 /// Adds the right sibling to the left one, both with n = 2^level samples. The
 /// shaders do the same below the nodes that they return, in this order and
 /// without fused operations, so the bits do not depend on who merges.
-fn merge_siblings(left: &mut [f32], right: &[f32], level: u32, stride: usize, are_blocks: bool) {
+fn merge_siblings(left: &mut [f32], right: &[f32], level: u32, stride: usize, block: u32) {
     // [Chan83] Eq. 2.1 for equal counts: M₂ = M₂a + M₂b + (Σa − Σb)² / (2n).
     // A power of two, hence exact.
     let scale = 0.5 / (1_u64 << level) as f32;
+    let are_blocks = block > 0 && level == block;
+    let pair = pair_level(block);
     for (a, b) in left
         .chunks_exact_mut(stride)
         .zip(right.chunks_exact(stride))
     {
         for channel in 0..3 {
             let d = a[RADIANCE + channel] - b[RADIANCE + channel];
-            let between = d * d * scale;
-            let m2 = &mut a[DEVIATIONS + channel];
-            let within = if are_blocks {
-                0.0
+            let within = a[DEVIATIONS + channel] + b[DEVIATIONS + channel];
+            let between = a[BETWEEN + channel] + b[BETWEEN + channel];
+            let (within, between) = if are_blocks {
+                (0.0, d)
             } else {
-                *m2 + b[DEVIATIONS + channel]
+                (within, between)
             };
-            *m2 = within + between;
             a[RADIANCE + channel] += b[RADIANCE + channel];
+            a[DEVIATIONS + channel] = within + d * d * scale;
+            // Of a pair of nets on, deviations of nets.
+            a[BETWEEN + channel] = match (level + 1).cmp(&pair) {
+                _ if block == 0 => 0.0,
+                Ordering::Less => between,
+                Ordering::Equal => between * between * scale,
+                Ordering::Greater => between + d * d * scale,
+            };
         }
         for i in ALBEDO..stride {
             a[i] += b[i];

@@ -206,7 +206,7 @@ impl Settings {
         })
     }
 
-    /// log₂ of the samples of the first blocks, each of which is a net; 0 when all are independent.
+    /// log₂ of the samples that a net takes in turn; 0 when all are independent.
     pub fn block_level(&self) -> u32 {
         match self.estimator {
             Estimator::Full => BLOCK_LEVEL,

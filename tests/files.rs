@@ -155,7 +155,7 @@ fn films_become_layers() {
     for sample in 0..2 {
         let pixel = |k: f32| {
             let x = k * (1.0 + sample as f32);
-            let radiance = [x, 2.0 * x, 3.0 * x, 0.0, 0.0, 0.0];
+            let radiance = [x, 2.0 * x, 3.0 * x, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0];
             // and one that was dropped
             let first_hit = [0.1, 0.2, 0.3, 0.0, 0.0, 1.0, 5.0, 1.0, sample as f32];
             [&radiance[..], &first_hit[..]].concat()

@@ -40,15 +40,15 @@ fn film(aovs: bool) -> Film {
 
 /// The leaf of one sample: its radiance, no deviation, its AOVs.
 fn leaf(sample: u64, aovs: bool) -> Vec<f32> {
-    let stride = if aovs { 15 } else { 6 };
+    let stride = if aovs { 18 } else { 9 };
     (0..PIXELS * stride)
         .map(|i| match i % stride {
-            3..6 => 0.0,
+            3..9 => 0.0,
             // a third of the samples miss: no depth, no coverage
-            12 | 13 if sample % 3 == 0 => 0.0,
-            13 => 1.0,
+            15 | 16 if sample % 3 == 0 => 0.0,
+            16 => 1.0,
             // of each pixel another share is dropped
-            14 => u8::from(hash(sample) % (2 + (i / stride) as u64) == 0).into(),
+            17 => u8::from(hash(sample) % (2 + (i / stride) as u64) == 0).into(),
             _ => radiance(sample, i as u64),
         })
         .collect()
@@ -173,8 +173,9 @@ fn a_million_equal_samples_lose_nothing() {
     };
     let mut film = Film::new(window, (1, 1), false);
     for sample in 0..1_000_000 {
-        film.add(sample, 0, vec![0.1, 0.1, 0.1, 0.0, 0.0, 0.0])
-            .unwrap();
+        let mut values = vec![0.0; 9];
+        values[..3].fill(0.1);
+        film.add(sample, 0, values).unwrap();
     }
     let mean = f64::from(film.mean()[0][0]);
     assert!((mean / 0.1 - 1.0).abs() < 1e-7, "{mean}");
@@ -194,7 +195,7 @@ fn moments_agree_with_two_passes_in_double_precision() {
         let (mut signal, mut noise) = (0.0, 0.0);
         for pixel in 0..PIXELS {
             for channel in 0..3 {
-                let float = (pixel * 6 + channel) as u64;
+                let float = (pixel * 9 + channel) as u64;
                 let x = || samples.clone().map(|s| f64::from(radiance(s, float)));
                 let n = (samples.end - samples.start) as f64;
                 let expected = x().sum::<f64>() / n;
@@ -219,7 +220,7 @@ fn small_deviations_on_a_large_mean_survive() {
     for sample in 0..64 {
         let mut values = leaf(sample, false);
         // 1000 and 1000.125 in turn: these and their sums are exact
-        for pixel in values.chunks_exact_mut(6) {
+        for pixel in values.chunks_exact_mut(9) {
             pixel[..3].fill(1000.0 + 0.125 * (sample % 2) as f32);
         }
         film.add(sample, 0, values).unwrap();
@@ -236,7 +237,7 @@ fn dropped_samples_are_counted_for_each_pixel() {
     let counts = film.dropped().unwrap();
     assert_eq!(counts.len(), PIXELS);
     for (pixel, count) in counts.into_iter().enumerate() {
-        let is_dropped = |sample: &u64| leaf(*sample, true)[15 * pixel + 14] == 1.0;
+        let is_dropped = |sample: &u64| leaf(*sample, true)[18 * pixel + 17] == 1.0;
         assert_eq!(count as usize, samples.clone().filter(is_dropped).count());
     }
     assert!(sequential(0..4, false).dropped().is_none());
@@ -246,12 +247,12 @@ fn dropped_samples_are_counted_for_each_pixel() {
 fn depth_averages_hits_and_misses_are_infinitely_far() {
     let mut film = film(true);
     for (sample, depth) in [2.0, 4.0, 0.0, 0.0].into_iter().enumerate() {
-        let mut values = vec![0.0; PIXELS * 15];
+        let mut values = vec![0.0; PIXELS * 18];
         if depth > 0.0 {
             // only the first pixel is ever hit
-            values[6..9].copy_from_slice(&[0.5, 0.25, 1.0]);
-            values[9..12].copy_from_slice(&[0.0, 1.0, 0.0]);
-            values[12..14].copy_from_slice(&[depth, 1.0]);
+            values[9..12].copy_from_slice(&[0.5, 0.25, 1.0]);
+            values[12..15].copy_from_slice(&[0.0, 1.0, 0.0]);
+            values[15..17].copy_from_slice(&[depth, 1.0]);
         }
         film.add(sample as u64, 0, values).unwrap();
     }
@@ -283,7 +284,7 @@ fn what_does_not_fit_is_refused_and_changes_nothing() {
             "node {first}, {level} of {len} floats"
         );
     };
-    let len = PIXELS * 6;
+    let len = PIXELS * 9;
     refused(8, 0, len);
     refused(23, 0, len);
     refused(16, 3, len);
@@ -322,8 +323,8 @@ fn pieces_are_aligned_and_make_up_the_range() {
     }
 }
 
-/// Leaves of a film whose first blocks have 2^`level` samples.
-fn blocks(samples: Range<u64>, level: u32) -> Film {
+/// Leaves of a film of nets in blocks of 2^`level` samples.
+fn nets(samples: Range<u64>, level: u32) -> Film {
     let mut film = film(false).with_blocks(level);
     for sample in samples {
         film.add(sample, 0, leaf(sample, false)).unwrap();
@@ -332,7 +333,7 @@ fn blocks(samples: Range<u64>, level: u32) -> Film {
 }
 
 /// Squared standard error of the mean from the sums of parts: Σ n (m − mean)² / (N (G − 1)).
-fn expected_error(parts: &[Range<u64>], float: u64) -> f64 {
+fn squared_error(parts: &[Range<u64>], float: u64) -> f64 {
     let value = |sample| f64::from(radiance(sample, float));
     let all = || parts.iter().flat_map(Clone::clone).map(value);
     let count = all().count() as f64;
@@ -342,71 +343,126 @@ fn expected_error(parts: &[Range<u64>], float: u64) -> f64 {
         n * (part.clone().map(value).sum::<f64>() / n - mean).powi(2)
     };
     let spread: f64 = parts.iter().map(spread).sum();
-    (spread / count / (parts.len() as f64 - 1.0)).sqrt()
+    spread / count / (parts.len() as f64 - 1.0)
+}
+
+/// That of nets in blocks of 4 samples, of which there is a number of whole ones and a rest, (Σ_w (x̄ − mean)² n W / (K − 1) + (A − B)²) /
+/// ((W + R) N): K whole nets of n samples have W of the N samples, A and B are the sums of the two nets of the R samples of the rest.
+fn squared_error_of_nets(whole: Range<u64>, rest: &[u64], count: u64, float: u64) -> f64 {
+    let value = |sample: u64| f64::from(radiance(sample, float));
+    let is_first = |sample: &u64| sample % 8 < 4;
+    let sum = |samples: &[u64]| samples.iter().map(|&s| value(s)).sum::<f64>();
+    let split = |samples: &[u64]| -> [f64; 2] {
+        let (a, b): (Vec<u64>, Vec<u64>) = samples.iter().partition(|s| is_first(s));
+        [sum(&a), sum(&b)]
+    };
+    let pairs: Vec<u64> = whole.clone().collect();
+    let means: Vec<f64> = pairs
+        .chunks(128)
+        .flat_map(|pair| split(pair).map(|sum| sum / 64.0))
+        .collect();
+    let mean = means.iter().sum::<f64>() / means.len() as f64;
+    let m2: f64 = means.iter().map(|m| 64.0 * (m - mean).powi(2)).sum();
+    let samples = pairs.len() as f64;
+    let of_whole = if pairs.is_empty() {
+        0.0
+    } else {
+        m2 / (means.len() - 1) as f64 * samples
+    };
+    let [a, b] = split(rest);
+    (of_whole + (a - b).powi(2)) / ((samples + rest.len() as f64) * count as f64)
 }
 
 #[test]
-fn blocks_decide_the_standard_error() {
+fn nets_and_their_blocks_decide_the_standard_error() {
     let singles = |samples: Range<u64>| samples.map(|s| s..s + 1).collect::<Vec<_>>();
-    let of =
-        |size: u64, samples: Range<u64>| samples.step_by(size as usize).map(move |s| s..s + size);
-    let cases: [(Range<u64>, Vec<Range<u64>>); 7] = [
-        // four of the first size, two of each of the next
+    let fours = |samples: Range<u64>| samples.step_by(4).map(|s| s..s + 4).collect::<Vec<_>>();
+    // Samples, parts of which blocks' deviations are taken, samples in whole pairs of nets (128 samples) and in other
+    // pairs of blocks, and degrees of freedom.
+    type Case = (Range<u64>, Vec<Range<u64>>, Range<u64>, Vec<u64>, f64);
+    let cases: [Case; 9] = [
+        (0..64, fours(0..64), 0..0, (0..64).collect(), 1.0 + 2.0),
+        (16..48, fours(16..48), 0..0, (16..48).collect(), 1.0 + 2.0),
+        // one pair of blocks: a single difference, whoever asks
+        (8..16, fours(8..16), 0..0, (8..16).collect(), 1.0),
+        // six whole nets
+        (128..512, fours(128..512), 128..512, vec![], 5.0 + 2.0),
+        // rests are taken together: (128 + 64)² / (128² / 1 + 64² / 1)
         (
-            0..64,
-            of(4, 0..16)
-                .chain(of(8, 16..32))
-                .chain(of(16, 32..64))
-                .collect(),
+            96..288,
+            fours(96..288),
+            128..256,
+            (96..128).chain(256..288).collect(),
+            1.8 + 2.0,
         ),
-        (16..48, vec![16..24, 24..32, 32..48]),
-        // none is larger than 256
-        (1024..2048, of(256, 1024..2048).collect()),
-        // whole blocks, with a rest of two nodes
-        (0..11, vec![0..4, 4..8, 8..10, 10..11]),
+        // (256 + 64)² / (256² / 3 + 64² / 1)
         (
-            0..39,
-            of(4, 0..16)
-                .chain([16..24, 24..32, 32..36, 36..38, 38..39])
-                .collect(),
+            0..320,
+            fours(0..320),
+            0..256,
+            (256..320).collect(),
+            102_400.0 / (65_536.0 / 3.0 + 4096.0) + 2.0,
         ),
-        (3..16, vec![3..4, 4..8, 8..12, 12..16]),
+        // a rest of two nodes, which no pair of blocks holds
+        (
+            0..11,
+            vec![0..4, 4..8, 8..10, 10..11],
+            0..0,
+            (0..8).collect(),
+            1.0 + 2.0,
+        ),
+        // two blocks, but no pair
+        (4..12, fours(4..12), 0..0, vec![], 1.0),
         // a single block: its samples
-        (4..11, singles(4..11)),
+        (4..11, singles(4..11), 0..0, vec![], 6.0),
     ];
-    for (samples, parts) in cases {
-        let film = blocks(samples.clone(), 2);
-        assert_eq!(film.parts(), parts.len() as u64, "{samples:?}");
+    for (samples, parts, whole, rest, degrees) in cases {
+        let film = nets(samples.clone(), 2);
+        let difference = film.parts() - 1.0 - degrees;
+        assert!(difference.abs() < 1e-12, "{samples:?}: {}", film.parts());
         let errors = film.standard_error();
+        let is_net = !whole.is_empty() || !rest.is_empty();
+        // one pair of blocks has no more than one
+        let weight = 3.0 * if degrees > 2.0 { degrees - 2.0 } else { 1.0 };
         for (pixel, errors) in errors.iter().enumerate() {
             for (channel, &error) in errors.iter().enumerate() {
-                let expected = expected_error(&parts, (pixel * 6 + channel) as u64);
-                let deviation = (f64::from(error) / expected - 1.0).abs();
-                // sums of up to 64 floats of very different size
-                assert!(deviation < 1e-4, "{samples:?}: {error} is not {expected}");
+                let float = (pixel * 9 + channel) as u64;
+                let mut expected = squared_error(&parts, float);
+                if is_net {
+                    let count = samples.end - samples.start;
+                    let of_nets = squared_error_of_nets(whole.clone(), &rest, count, float);
+                    expected = (weight * of_nets + 0.75 * expected) / (weight + 1.0);
+                }
+                let deviation = (f64::from(error) / expected.sqrt() - 1.0).abs();
+                // sums of up to 384 floats of very different size
+                assert!(
+                    deviation < 1e-4,
+                    "{samples:?}: {error} is not {}",
+                    expected.sqrt()
+                );
             }
         }
     }
-    assert!(blocks(0..1, 2).relative_error().is_infinite());
+    assert!(nets(0..1, 2).relative_error().is_infinite());
 }
 
 #[test]
-fn blocks_give_the_same_bits_in_any_order() {
-    for samples in [0..100, 3..77, 64..128] {
-        let expected = bits(&blocks(samples.clone(), 3));
+fn nets_give_the_same_bits_in_any_order() {
+    for samples in [0..100, 3..77, 64..128, 200..600] {
+        let expected = bits(&nets(samples.clone(), 3));
         for seed in 0..20 {
             let mut film = film(false).with_blocks(3);
             for (first, level) in random_pieces(samples.clone(), seed) {
-                let own = blocks(first..first + (1 << level), 3);
+                let own = nets(first..first + (1 << level), 3);
                 let values = own.nodes().next().unwrap().2.to_vec();
                 film.add(first, level, values).unwrap();
             }
             assert!(bits(&film) == expected, "{samples:?}, split {seed}");
         }
     }
-    let mut other = blocks(0..4, 3);
+    let mut other = nets(0..4, 3);
     assert!(
-        other.merge(blocks(4..8, 2)).is_err(),
+        other.merge(nets(4..8, 2)).is_err(),
         "blocks of another size"
     );
 }

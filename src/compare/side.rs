@@ -211,7 +211,7 @@ pub fn shared_samples(a: &Image, b: &Image) -> Option<String> {
         let list = text(image, "samples")?;
         let nets = |r: &str| {
             let (start, end) = r.split_once("..")?;
-            Some(image.blocks_around(start.parse().ok()?..end.parse().ok()?))
+            Some(image.nets_around(start.parse().ok()?..end.parse().ok()?))
         };
         list.split(',').map(nets).collect()
     };

@@ -33,7 +33,7 @@ impl Film {
             0.0 < confidence && confidence < 1.0,
             "a confidence of {confidence}"
         );
-        let degrees = self.parts() as f64 - 1.0;
+        let degrees = self.parts() - 1.0;
         if degrees < 1.0 {
             return vec![[f32::INFINITY; 3]; self.pixels()];
         }

@@ -149,7 +149,7 @@ impl Image {
     pub fn from_film(film: &Film, aovs: &[Aov], mut metadata: Metadata) -> Result<Self> {
         let block = (1_u64 << film.block_level()) as f64;
         metadata.insert(Self::BLOCK.to_owned(), block.into());
-        metadata.insert(Self::PARTS.to_owned(), (film.parts() as f64).into());
+        metadata.insert(Self::PARTS.to_owned(), film.parts().into());
         let mut channels = Vec::new();
         push_vectors(
             &mut channels,

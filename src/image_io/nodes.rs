@@ -4,19 +4,22 @@
 use std::ops::Range;
 
 use super::{Channel, Image, Value};
-use crate::film::{Film, block_of};
+use crate::film::{Film, pair_level};
 
 /// Before the names of the layers.
 const PREFIX: &str = "node.";
 
-/// The floats of a pixel in a node, in order; the first six where a film has no sums of the first hit.
-const PARTS: [&str; 15] = [
+/// The floats of a pixel in a node, in order; the first nine where a film has no sums of the first hit.
+const PARTS: [&str; 18] = [
     "sum.R",
     "sum.G",
     "sum.B",
     "deviations.R",
     "deviations.G",
     "deviations.B",
+    "between.R",
+    "between.G",
+    "between.B",
     "albedo.R",
     "albedo.G",
     "albedo.B",
@@ -29,7 +32,7 @@ const PARTS: [&str; 15] = [
 ];
 
 impl Image {
-    /// Entry of the header: number of samples of the first blocks, whose samples depend on each other, a power of two.
+    /// Entry of the header: number of samples of the blocks that two nets are dealt out in, a power of two; 1: samples are independent.
     pub const BLOCK: &'static str = "stderr.block";
     /// Entry of the header: number of independent parts that standard errors come from.
     pub const PARTS: &'static str = "stderr.parts";
@@ -83,7 +86,7 @@ impl Image {
         Ok(film)
     }
 
-    /// log₂ of the samples of the first blocks, as the header tells; 0 where it does not.
+    /// log₂ of the samples of a block, as the header tells; 0 where it does not.
     pub fn block_level(&self) -> u32 {
         match self.metadata.get(Self::BLOCK) {
             Some(Value::Number(count)) if *count >= 1.0 => (*count as u64).ilog2(),
@@ -91,11 +94,11 @@ impl Image {
         }
     }
 
-    /// The blocks that hold some samples.
-    pub fn blocks_around(&self, samples: Range<u64>) -> Range<u64> {
-        let size = |sample| 1_u64 << block_of(self.block_level(), sample);
+    /// The pairs of nets that hold some samples.
+    pub fn nets_around(&self, samples: Range<u64>) -> Range<u64> {
+        let size = 1_u64 << pair_level(self.block_level());
         let (start, last) = (samples.start, samples.end.saturating_sub(1));
-        start - start % size(start)..(last - last % size(last)).saturating_add(size(last))
+        start - start % size..(last - last % size).saturating_add(size)
     }
 
     /// The independent parts that standard errors come from, where the header tells.

@@ -94,8 +94,8 @@ fn film() -> Film {
         y1: 2,
     };
     let mut film = Film::new(window, (5, 3), false);
-    film.add(0, 3, (0..36).map(|i| i as f32).collect()).unwrap();
-    film.add(16, 1, (0..36).map(|i| 0.5 * i as f32).collect())
+    film.add(0, 3, (0..54).map(|i| i as f32).collect()).unwrap();
+    film.add(16, 1, (0..54).map(|i| 0.5 * i as f32).collect())
         .unwrap();
     film
 }

@@ -14,8 +14,8 @@ use crate::tier::{count, is_night};
 /// Renders, and samples of each.
 const RENDERS: u64 = 64;
 const SAMPLES: u64 = 128;
-/// Degrees of freedom of standard errors: of four nets of 16 and two of 32, and of samples.
-const DEGREES: [(Estimator, f64); 2] = [(Estimator::Full, 5.0), (Estimator::Textbook, 127.0)];
+/// Degrees of freedom of standard errors: of two nets and their blocks (`src/film/error.rs`), and of samples.
+const DEGREES: [(Estimator, f64); 2] = [(Estimator::Full, 3.0), (Estimator::Textbook, 127.0)];
 
 #[test]
 fn intervals_hold_the_truth_as_often_as_they_say() {

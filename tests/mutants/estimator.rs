@@ -134,7 +134,27 @@ pub const MUTANTS: &[Mutant] = &[
         wrong: "one digit of one column of the nets is wrong",
         file: "shaders/rng.glsl",
         edits: &[("uvec4(185u, 64u, 85u, 9u)", "uvec4(184u, 64u, 85u, 9u)")],
-        killers: &["shading::nets::blocks_are_nets"],
+        killers: &["shading::nets::samples_in_turn_are_nets"],
+    },
+    Mutant {
+        name: "one-net",
+        wrong: "the two nets that take turns are one",
+        file: "shaders/rng.glsl",
+        edits: &[(
+            "uint net = sample_low & (WHICH | ~(PAIR - 1u));",
+            "uint net = sample_low & ~(PAIR - 1u);",
+        )],
+        killers: &["shading::nets::nets_are_independent_of_each_other"],
+    },
+    Mutant {
+        name: "nets-of-a-block",
+        wrong: "what two nets differ by is that of their last blocks",
+        file: "shaders/film.glsl",
+        edits: &[(
+            "precise vec3 between = a.between + b.between;",
+            "precise vec3 between = b.between;",
+        )],
+        killers: &["integrator::calibration::intervals_hold_the_truth_as_often_as_they_say"],
     },
     Mutant {
         name: "blocks-as-samples",

@@ -1,15 +1,17 @@
-//! Samples of a block are a scrambled Sobol net: evenly spread within the block,
-//! uniform and independent from one block to the next.
+//! Two scrambled nets take turns, a block of samples each: the samples of either are evenly spread, those of two nets
+//! independent.
 
 use bytemuck::{Pod, Zeroable};
 use etendue::gpu::BindingKind;
-use etendue::layout::{BLOCK_LEVEL, MAX_BLOCK_LEVEL};
+use etendue::layout::{BLOCK_LEVEL, NET_LEVEL};
 use etendue::spec::Spec;
 
 use crate::statistics::{Estimate, Family, chi_square};
 use crate::{Kernel, finish, groups, open};
 
 const COUNT: usize = 1 << 20;
+const BLOCK: usize = 1 << BLOCK_LEVEL;
+const NET: usize = 1 << NET_LEVEL;
 
 #[repr(C)]
 #[derive(Clone, Copy, Pod, Zeroable)]
@@ -57,7 +59,13 @@ fn most(points: impl Iterator<Item = (f32, f32)>, columns: usize, rows: usize) -
     cells.into_iter().max().unwrap()
 }
 
-/// Digits that the planes of two numbers lack for the first 2^m samples of a block, m = 4 … 8, so that a cell may hold 2^lacks points:
+/// The samples of one of the two nets that take turns in some samples, from the beginning of a pair on.
+fn net(samples: &[Draw], which: usize) -> Vec<Draw> {
+    let blocks = samples.chunks_exact(BLOCK).skip(which).step_by(2);
+    blocks.flatten().copied().collect()
+}
+
+/// Digits that the planes of two numbers lack for the first 2^m samples of a net, m = 4 … 8, so that a cell may hold 2^lacks points:
 /// x with y, z and w; y with z and w; z with w.
 const LACKS: [(usize, usize, [u32; 5]); 6] = [
     (0, 1, [0, 1, 1, 0, 1]),
@@ -68,45 +76,24 @@ const LACKS: [(usize, usize, [u32; 5]); 6] = [
     (2, 3, [0, 0, 1, 0, 0]),
 ];
 
-/// Four blocks of 16, then two of each double size; each of their beginnings is a net, too.
+/// Each beginning of a net is a net, too.
 #[test]
-fn blocks_are_nets() {
+fn samples_in_turn_are_nets() {
     let Some(kernel) = kernel() else { return };
-    for level in BLOCK_LEVEL..=MAX_BLOCK_LEVEL {
-        // the first block of this size, and the second
-        let start = if level == BLOCK_LEVEL { 0 } else { 2 << level };
-        for (number, place) in [
-            (0, [0, 0]),
-            (1, [1, 0]),
-            (0, [1, 1]),
-            (1, [2, 0]),
-            (0, [1000, 2]),
-        ] {
-            let block = 1_usize << level;
-            let first = start + (number << level);
-            for (pixel, samples) in draw(&kernel, first, block, place)
-                .chunks_exact(block)
+    // the first pair of nets, and the second
+    for first in [0, 2 * NET] {
+        for place in [[0, 0], [1, 0], [1, 1], [2, 0], [1000, 2]] {
+            for (pixel, pair) in draw(&kernel, first as u32, 2 * NET, place)
+                .chunks_exact(2 * NET)
                 .enumerate()
             {
-                for m in BLOCK_LEVEL..=level {
-                    let what = format!(
-                        "{place:?}, pixel {pixel}, 2^{m} of the 2^{level} samples from {first} on"
-                    );
-                    let part = &samples[..1 << m];
-                    for c in 0..4 {
-                        let line = part.iter().map(|d| (d.number[c], 0.0));
-                        assert_eq!(most(line, 1 << m, 1), 1, "{what}, number {c}");
-                    }
-                    for (x, y, lacks) in LACKS {
-                        let lacks = lacks[(m - BLOCK_LEVEL) as usize];
-                        for columns in 1..m - lacks {
-                            let plane = part.iter().map(|d| (d.number[x], d.number[y]));
-                            let seen = most(plane, 1 << columns, 1 << (m - lacks - columns));
-                            assert!(
-                                seen <= 1 << lacks,
-                                "{what}, numbers {x} and {y}, 2^{columns} columns: {seen}"
-                            );
-                        }
+                for which in 0..2 {
+                    let samples = net(pair, which);
+                    for m in BLOCK_LEVEL..=NET_LEVEL {
+                        let what = format!(
+                            "{place:?}, pixel {pixel}, 2^{m} samples of net {which} from {first} on"
+                        );
+                        assert_net(&samples[..1 << m], m, &what);
                     }
                 }
             }
@@ -115,13 +102,38 @@ fn blocks_are_nets() {
     close(kernel);
 }
 
+/// 2^m samples are spread as evenly as the columns of the net allow.
+fn assert_net(samples: &[Draw], m: u32, what: &str) {
+    for c in 0..4 {
+        let line = samples.iter().map(|d| (d.number[c], 0.0));
+        assert_eq!(most(line, 1 << m, 1), 1, "{what}, number {c}");
+    }
+    for (x, y, lacks) in LACKS {
+        let lacks = lacks[(m - BLOCK_LEVEL) as usize];
+        for columns in 1..m - lacks {
+            let plane = samples.iter().map(|d| (d.number[x], d.number[y]));
+            let seen = most(plane, 1 << columns, 1 << (m - lacks - columns));
+            assert!(
+                seen <= 1 << lacks,
+                "{what}, numbers {x} and {y}, 2^{columns} columns: {seen}"
+            );
+        }
+    }
+}
+
 #[test]
-fn blocks_are_independent_of_each_other() {
+fn nets_are_independent_of_each_other() {
     let Some(kernel) = kernel() else { return };
     let mut family = Family::default();
-    // One sample of each block: the first of the first and the last of the third.
+    // One sample of each net: the first of the first, the last of the first block of the second, and one of the next pair.
     let mut numbers: Vec<Vec<f32>> = Vec::new();
-    let places = [(0, [1, 0]), (0, [1, 1]), (0, [2, 0]), (47, [1, 0])];
+    let places = [
+        (0, [1, 0]),
+        (0, [1, 1]),
+        (0, [2, 0]),
+        (31, [1, 0]),
+        (512, [1, 0]),
+    ];
     let mut keys: Vec<[u32; 4]> = Vec::new();
     for (sample, place) in places {
         let draws = draw(&kernel, sample, 1, place);
@@ -149,64 +161,73 @@ fn blocks_are_independent_of_each_other() {
             family.add(format!("numbers {i}, {j}"), p);
         }
     }
-    family.assert("independent blocks");
+    family.assert("independent nets");
     let count = keys.len();
     keys.sort_unstable();
     keys.dedup();
-    assert_eq!(keys.len(), count, "blocks share their keys");
+    assert_eq!(keys.len(), count, "nets share their keys");
     close(kernel);
 }
 
-/// Mean of the means of blocks.
-fn block_means(values: &[f64], block: usize) -> Estimate {
-    let means = values.chunks_exact(block);
-    Estimate::of(means.map(|b| b.iter().sum::<f64>() / block as f64))
+/// Mean of the means of nets.
+fn net_means(values: &[f64], net: usize) -> Estimate {
+    let means = values.chunks_exact(net);
+    Estimate::of(means.map(|n| n.iter().sum::<f64>() / net as f64))
 }
 
 #[test]
 fn nets_integrate_without_bias_and_slots_do_not_go_together() {
     let Some(kernel) = kernel() else { return };
-    // The first blocks, and the first of the largest.
-    for (first, level) in [(0, BLOCK_LEVEL), (512, MAX_BLOCK_LEVEL)] {
-        let block = 1_usize << level;
-        let a = draw(&kernel, first, block, [1, 0]);
-        let b = draw(&kernel, first, block, [1, 1]);
+    // The first block of the first net, and whole nets: of four pairs, so that as many are drawn.
+    for size in [BLOCK, NET] {
+        let of = |place| -> Vec<Draw> {
+            if size == BLOCK {
+                return draw(&kernel, 0, BLOCK, place);
+            }
+            let pairs = (1..5).flat_map(|k| draw(&kernel, 2 * k * NET as u32, 2 * NET, place));
+            let pairs: Vec<Draw> = pairs.collect();
+            let pairs = pairs.chunks_exact(2 * NET);
+            pairs
+                .flat_map(|pair| [net(pair, 0), net(pair, 1)].concat())
+                .collect()
+        };
+        let (a, b) = (of([1, 0]), of([1, 1]));
         let u = |d: &Draw, c: usize| f64::from(d.number[c]) - 0.5;
         let assert_zero = |name: &str, values: &[f64]| {
-            let seen = block_means(values, block);
+            let seen = net_means(values, size);
             assert!(seen.mean.abs() < seen.chance(), "{name}: {seen:?}");
-            // of one block
+            // of one net
             seen.error.powi(2) * (seen.degrees + 1.0)
         };
         // ∫ (x − ½)(y − ½) = 0, with variance 1/144 for one sample.
-        let independent = 1.0 / 144.0 / block as f64;
+        let independent = 1.0 / 144.0 / size as f64;
         for i in 0..4 {
             let line: Vec<f64> = a.iter().map(|d| u(d, i)).collect();
             let variance = assert_zero(&format!("number {i}"), &line);
             // Stratified into as many parts as samples, n: n⁻² of 1/12 for each sample.
-            let gain = 1.0 / 12.0 / block as f64 / variance;
-            let parts = (block * block) as f64;
-            // The largest are 4096 blocks only.
-            let least = if level == BLOCK_LEVEL { 0.95 } else { 0.93 };
-            assert!(gain > least * parts, "{block}, number {i}: gain {gain}");
+            let gain = 1.0 / 12.0 / size as f64 / variance;
+            let parts = (size * size) as f64;
+            // Whole nets are fewer.
+            let least = if size == BLOCK { 0.95 } else { 0.93 };
+            assert!(gain > least * parts, "{size}, number {i}: gain {gain}");
             for j in 0..4 {
                 let across: Vec<f64> = a.iter().zip(&b).map(|(a, b)| u(a, i) * u(b, j)).collect();
                 let variance = assert_zero(&format!("slots, {i} and {j}"), &across);
                 // Padding by shuffles: as good as independent, no better and no worse.
                 let ratio = variance / independent;
-                println!("{block}: slots {i} and {j}: {ratio:.3}");
+                println!("{size}: slots {i} and {j}: {ratio:.3}");
                 assert!(
                     (0.8..1.1).contains(&ratio),
-                    "{block}: slots, {i} and {j}: {ratio}"
+                    "{size}: slots, {i} and {j}: {ratio}"
                 );
                 if j < i {
                     let inside: Vec<f64> = a.iter().map(|d| u(d, i) * u(d, j)).collect();
                     let variance = assert_zero(&format!("numbers {i} and {j}"), &inside);
                     println!(
-                        "{block}: numbers {i}, {j}: gain {:.1}",
+                        "{size}: numbers {i}, {j}: gain {:.1}",
                         independent / variance
                     );
-                    assert!(variance < independent, "{block}: numbers {i} and {j}");
+                    assert!(variance < independent, "{size}: numbers {i} and {j}");
                 }
             }
         }

@@ -22,7 +22,7 @@ fn film() -> Film {
     };
     let mut film = Film::new(window, (5, 3), false);
     for (first, level) in [(1, 0), (4, 2), (32, 5)] {
-        let values = (0..36).map(|i| (hash(first + i) % 1000) as f32).collect();
+        let values = (0..54).map(|i| (hash(first + i) % 1000) as f32).collect();
         film.add(first, level, values).unwrap();
     }
     film

@@ -97,7 +97,7 @@ fn a_dry_run_says_what_a_render_takes() {
     let text = stdout(&output);
     for part in [
         "device memory",
-        "film 48.0 KiB",
+        "film 72.0 KiB",
         "film on host",
         "samples        0..128",
     ] {
@@ -111,7 +111,7 @@ fn a_dry_run_says_what_a_render_takes() {
         let message = stderr(&output);
         assert_eq!(output.status.code(), Some(1), "{message}");
         assert!(
-            message.contains("host memory free, needs 773094113280 bytes"),
+            message.contains("host memory free, needs 927712935936 bytes"),
             "{message}"
         );
     }

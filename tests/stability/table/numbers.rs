@@ -166,7 +166,7 @@ pub const RANDOM: &[Case] = &[
                 "stability::chance::errors_of_nets_fall_at_least_as_of_independent_samples",
                 "256 samples",
             ),
-            passes("shading::nets::blocks_are_independent_of_each_other"),
+            passes("shading::nets::nets_are_independent_of_each_other"),
             passes("shading::nets::nets_integrate_without_bias_and_slots_do_not_go_together"),
         ],
     },
