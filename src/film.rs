@@ -94,8 +94,7 @@ impl Film {
     }
 
     /// An empty film of samples of two nets that take turns (`rng_key` in rng.glsl), 2^`level` samples each, and of two
-    /// others after each pair of 2^[`pair_level`] samples. From two whole blocks on the standard error comes from
-    /// what nets and their blocks differ by.
+    /// others after 2^(`level` + 5). From two whole blocks on the standard error comes from what nets and their blocks differ by.
     #[must_use]
     pub fn with_blocks(mut self, level: u32) -> Self {
         self.block_level = level;

@@ -150,7 +150,7 @@ impl Film {
             }
             let mut square = all.m2 / (parts - 1.0) / all.count;
             if degrees > 0.0 {
-                // of one sample's share, times samples
+                // variance of a sample, as whole nets have it, times their samples
                 let of_whole = match whole {
                     0.0 => 0.0,
                     whole => nets.m2 / (self.whole_nets(whole) - 1.0) * whole,
