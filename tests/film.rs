@@ -380,7 +380,7 @@ fn nets_and_their_blocks_decide_the_standard_error() {
     // Samples, parts of which blocks' deviations are taken, samples in whole pairs of nets (128 samples) and in other
     // pairs of blocks, and degrees of freedom.
     type Case = (Range<u64>, Vec<Range<u64>>, Range<u64>, Vec<u64>, f64);
-    let cases: [Case; 9] = [
+    let cases: [Case; 12] = [
         (0..64, fours(0..64), 0..0, (0..64).collect(), 1.0 + 2.0),
         (16..48, fours(16..48), 0..0, (16..48).collect(), 1.0 + 2.0),
         // one pair of blocks: a single difference, whoever asks
@@ -411,6 +411,28 @@ fn nets_and_their_blocks_decide_the_standard_error() {
             (0..8).collect(),
             1.0 + 2.0,
         ),
+        // eight pairs
+        (
+            1024..2048,
+            fours(1024..2048),
+            1024..2048,
+            vec![],
+            15.0 + 2.0,
+        ),
+        (
+            0..39,
+            [fours(0..36), vec![36..38, 38..39]].concat(),
+            0..0,
+            (0..32).collect(),
+            1.0 + 2.0,
+        ),
+        (
+            3..16,
+            [vec![3..4], fours(4..16)].concat(),
+            0..0,
+            (8..16).collect(),
+            1.0 + 2.0,
+        ),
         // two blocks, but no pair
         (4..12, fours(4..12), 0..0, vec![], 1.0),
         // a single block: its samples
@@ -434,7 +456,7 @@ fn nets_and_their_blocks_decide_the_standard_error() {
                     expected = (weight * of_nets + 0.75 * expected) / (weight + 1.0);
                 }
                 let deviation = (f64::from(error) / expected.sqrt() - 1.0).abs();
-                // sums of up to 384 floats of very different size
+                // sums of up to 1024 floats of very different size
                 assert!(
                     deviation < 1e-4,
                     "{samples:?}: {error} is not {}",
