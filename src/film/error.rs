@@ -26,8 +26,8 @@ impl Film {
     /// Below two whole blocks their samples are taken as independent, so the error is
     /// rather overstated. With fewer than two samples nothing is known, and it is +∞.
     pub fn standard_error(&self) -> Vec<[f32; 3]> {
-        (0..self.pixels())
-            .map(|pixel| self.moments(pixel).1.map(|e| e as f32))
+        self.moments()
+            .map(|(_, error)| error.map(|e| e as f32))
             .collect()
     }
 
@@ -36,8 +36,7 @@ impl Film {
     /// 0 for an image without noise (a black one, too), +∞ below two samples.
     pub fn relative_error(&self) -> f64 {
         let (mut signal, mut noise) = (0.0, 0.0);
-        for pixel in 0..self.pixels() {
-            let (mean, error) = self.moments(pixel);
+        for (mean, error) in self.moments() {
             for channel in 0..3 {
                 signal += mean[channel] * mean[channel];
                 noise += error[channel] * error[channel];
@@ -55,113 +54,118 @@ impl Film {
     /// Number of independent parts that have as many degrees of freedom as [`Film::standard_error`], which is one less. Not a
     /// whole number where a pair of nets is not complete beside others.
     pub fn parts(&self) -> f64 {
-        let parts = self.blocks() as f64;
-        match self.degrees_of_nets() {
-            0.0 => parts,
-            degrees => parts.min(degrees + DEGREES + 1.0),
+        let parts = self.independent();
+        match parts.degrees {
+            0.0 => parts.blocks,
+            degrees => parts.blocks.min(degrees + DEGREES + 1.0),
         }
     }
 
-    /// Whole blocks and the nodes that are smaller; samples where there are not two whole blocks.
-    fn blocks(&self) -> u64 {
-        if !self.has_blocks() {
-            return self.samples();
-        }
-        let nodes = self.nodes.iter();
-        nodes
-            .map(|(_, node)| self.whole_blocks(node.level).max(1))
-            .sum()
-    }
-
-    /// Number of whole blocks in a node; 0 where it is a part of one.
-    fn whole_blocks(&self, level: u32) -> u64 {
-        level
-            .checked_sub(self.block_level)
-            .map_or(0, |more| 1 << more)
-    }
-
-    /// Whether there are two blocks to compare.
-    fn has_blocks(&self) -> bool {
-        let blocks = self.nodes.values().map(|n| self.whole_blocks(n.level));
-        blocks.sum::<u64>() >= 2
-    }
-
-    /// Samples in whole pairs of nets, and those in pairs of blocks beside these.
-    fn paired(&self) -> [f64; 2] {
-        let mut paired = [0.0; 2];
-        for node in self.nodes.values().filter(|_| self.block_level > 0) {
-            let samples = (1_u64 << node.level) as f64;
-            if node.level >= pair_level(self.block_level) {
-                paired[0] += samples;
-            } else if node.level > self.block_level {
-                paired[1] += samples;
-            }
-        }
-        paired
-    }
-
-    /// Degrees of freedom of what nets differ by \[Satterthwaite46\]: of whole nets, and one of all others, which are taken together. 0
-    /// where no pair of blocks is there.
-    fn degrees_of_nets(&self) -> f64 {
-        let [whole, rest] = self.paired();
-        let square = rest * rest
-            + if whole > 0.0 {
-                whole * whole / (self.whole_nets(whole) - 1.0)
-            } else {
-                0.0
-            };
-        if square > 0.0 {
-            (whole + rest).powi(2) / square
+    /// What of the film is independent of what.
+    fn independent(&self) -> Parts {
+        let whole_blocks = |level: u32| {
+            level
+                .checked_sub(self.block_level)
+                .map_or(0_u64, |more| 1 << more)
+        };
+        let levels = || self.nodes.values().map(|node| node.level);
+        let has_blocks = levels().map(whole_blocks).sum::<u64>() >= 2;
+        let blocks = if has_blocks {
+            levels().map(|level| whole_blocks(level).max(1)).sum()
         } else {
-            0.0
+            self.samples()
+        };
+        let mut parts = Parts {
+            has_blocks,
+            blocks: blocks as f64,
+            ..Parts::default()
+        };
+        if self.block_level == 0 {
+            return parts;
         }
-    }
-
-    /// Number of whole nets in so many samples.
-    fn whole_nets(&self, samples: f64) -> f64 {
-        2.0 * samples / (1_u64 << pair_level(self.block_level)) as f64
-    }
-
-    /// Mean and standard error of a pixel's radiance.
-    pub(super) fn moments(&self, pixel: usize) -> ([f64; 3], [f64; 3]) {
-        let start = pixel * self.floats_per_pixel();
-        let (has_blocks, parts) = (self.has_blocks(), self.blocks() as f64);
-        let ([whole, rest], degrees) = (self.paired(), self.degrees_of_nets());
-        let (mut mean, mut error) = ([0.0; 3], [f64::INFINITY; 3]);
-        for channel in 0..3 {
-            let (mut all, mut nets) = (Spread::default(), Spread::default());
-            let mut difference = 0.0;
-            for node in self.nodes.values() {
-                let float = |part: usize| f64::from(node.values[start + part + channel]);
-                let count = (1_u64 << node.level) as f64;
-                // Deviations within a block say nothing about how blocks differ.
-                let counts = !has_blocks || node.level > self.block_level;
-                let own = if counts { float(DEVIATIONS) } else { 0.0 };
-                all.add(count, float(RADIANCE), own);
-                if node.level >= pair_level(self.block_level) {
-                    nets.add(count, float(RADIANCE), float(BETWEEN));
-                } else {
-                    difference += float(BETWEEN);
-                }
+        let pair = pair_level(self.block_level);
+        for level in levels().filter(|&level| level > self.block_level) {
+            let samples = (1_u64 << level) as f64;
+            if level >= pair {
+                parts.whole += samples;
+            } else {
+                parts.rest += samples;
             }
-            mean[channel] = all.mean;
-            if parts < 2.0 {
+        }
+        parts.nets = 2.0 * parts.whole / (1_u64 << pair) as f64;
+        let mut square = parts.rest * parts.rest;
+        if parts.nets > 0.0 {
+            square += parts.whole * parts.whole / (parts.nets - 1.0);
+        }
+        if square > 0.0 {
+            parts.degrees = (parts.whole + parts.rest).powi(2) / square;
+        }
+        parts
+    }
+
+    /// Mean and standard error of the radiance of each pixel.
+    pub(super) fn moments(&self) -> impl Iterator<Item = ([f64; 3], [f64; 3])> + '_ {
+        let parts = self.independent();
+        (0..self.pixels()).map(move |pixel| {
+            let [red, green, blue] = [0, 1, 2].map(|channel| self.moment(pixel, channel, &parts));
+            ([red.0, green.0, blue.0], [red.1, green.1, blue.1])
+        })
+    }
+
+    /// Mean and standard error of one channel of a pixel's radiance.
+    fn moment(&self, pixel: usize, channel: usize, parts: &Parts) -> (f64, f64) {
+        let start = pixel * self.floats_per_pixel() + channel;
+        let (mut all, mut nets) = (Spread::default(), Spread::default());
+        let mut difference = 0.0;
+        for node in self.nodes.values() {
+            let float = |part: usize| f64::from(node.values[start + part]);
+            let count = (1_u64 << node.level) as f64;
+            // Deviations within a block say nothing about how blocks differ.
+            let counts = !parts.has_blocks || node.level > self.block_level;
+            let own = if counts { float(DEVIATIONS) } else { 0.0 };
+            all.add(count, float(RADIANCE), own);
+            if parts.degrees == 0.0 {
                 continue;
             }
-            let mut square = all.m2 / (parts - 1.0) / all.count;
-            if degrees > 0.0 {
-                // variance of a sample, as whole nets have it, times their samples
-                let of_whole = match whole {
-                    0.0 => 0.0,
-                    whole => nets.m2 / (self.whole_nets(whole) - 1.0) * whole,
-                };
-                let of_nets = (of_whole + difference * difference) / ((whole + rest) * all.count);
-                square = (NETS * degrees * of_nets + GAIN * square) / (NETS * degrees + 1.0);
+            if node.level >= pair_level(self.block_level) {
+                nets.add(count, float(RADIANCE), float(BETWEEN));
+            } else {
+                difference += float(BETWEEN);
             }
-            error[channel] = square.sqrt();
         }
-        (mean, error)
+        if parts.blocks < 2.0 {
+            return (all.mean, f64::INFINITY);
+        }
+        let mut square = all.m2 / (parts.blocks - 1.0) / all.count;
+        if parts.degrees > 0.0 {
+            // variance of a sample, as whole nets have it, times their samples
+            let of_whole = match parts.whole {
+                0.0 => 0.0,
+                whole => nets.m2 / (parts.nets - 1.0) * whole,
+            };
+            let paired = parts.whole + parts.rest;
+            let of_nets = (of_whole + difference * difference) / (paired * all.count);
+            let weight = NETS * parts.degrees;
+            square = (weight * of_nets + GAIN * square) / (weight + 1.0);
+        }
+        (all.mean, square.sqrt())
     }
+}
+
+/// What standard errors are taken from.
+#[derive(Default)]
+struct Parts {
+    /// Whether there are two whole blocks to compare.
+    has_blocks: bool,
+    /// Number of whole blocks and of nodes that are smaller; of samples where there are not two whole blocks.
+    blocks: f64,
+    /// Samples in whole pairs of nets, and in pairs of blocks beside these, which are taken together.
+    whole: f64,
+    rest: f64,
+    /// Number of whole nets.
+    nets: f64,
+    /// Degrees of freedom of what nets differ by \[Satterthwaite46\]; 0 where no pair of blocks is there.
+    degrees: f64,
 }
 
 /// Mean and squared deviations of what is added up.

@@ -38,9 +38,7 @@ impl Film {
             return vec![[f32::INFINITY; 3]; self.pixels()];
         }
         let quantile = student_quantile(1.0 - confidence, degrees + WEIGHT);
-        let moments: Vec<_> = (0..self.pixels())
-            .map(|pixel| self.moments(pixel))
-            .collect();
+        let moments: Vec<_> = self.moments().collect();
         let width = (self.window.x1 - self.window.x0) as usize;
         let mut half = vec![[0.0; 3]; self.pixels()];
         for channel in 0..3 {
