@@ -7,6 +7,22 @@
 
 layout(push_constant, scalar) uniform BatchBlock { Batch batch; };
 
+#ifndef WGPU
+layout(binding = BIND_ALLOTMENT) uniform usamplerBuffer allotment;
+#endif
+
+// Where others take one sample, a pixel of the window takes 2 to this power.
+uint kernel_exponent(uvec2 at)
+{
+    uint exponent = 0u;
+#ifndef WGPU
+    if (HAS_ALLOTMENT) {
+        exponent = texelFetch(allotment, int(at.y * params.window_width + at.x)).x;
+    }
+#endif
+    return exponent;
+}
+
 // Place in the 8 × 8 tile: eight neighbours in the index are a block of 4 × 2 pixels, so that a subgroup stays together.
 uvec2 kernel_place(uint i)
 {
@@ -42,13 +58,19 @@ void ledger_add(uint low, uint amount)
     }
 }
 
-// The path of sample i of the batch at a pixel of the window.
-PathState kernel_start(uint i, uvec2 at)
+// The path of sample i of the batch at a pixel of the window, which takes 2^exponent times as many as others.
+PathState kernel_start(uint i, uvec2 at, uint exponent)
 {
     uvec2 pixel = uvec2(params.window_x, params.window_y) + at;
+    uint low = batch.first_sample_low;
+    uint high = batch.first_sample_high;
+    if (HAS_ALLOTMENT) {
+        // no shift by 32, which is undefined
+        high = high << exponent | low >> 1u >> (31u - exponent);
+        low <<= exponent;
+    }
     // Batches are aligned, so the low word does not overflow within one.
-    uvec4 key = rng_key(uvec2(params.seed_low, params.seed_high), pixel.y * params.width + pixel.x,
-                        batch.first_sample_low + i, batch.first_sample_high);
+    uvec4 key = rng_key(uvec2(params.seed_low, params.seed_high), pixel.y * params.width + pixel.x, low + i, high);
     return path_start(key, pixel);
 }
 
@@ -68,9 +90,11 @@ void main()
     PathState path;
     path.is_alive = false;
     path.shadow.is_waiting = false;
-    // Of the sample that is being taken. Before the first pixel all of the one before it are.
-    uint i = batch.sample_count;
     uvec2 at;
+    // Of the pixel, and of its sample that is being taken. Before the first pixel all of the one before it are.
+    uint exponent = 0u;
+    uint count = batch.sample_count;
+    uint i = count;
     bool is_first = true;
     // A lane whose path has ended starts its next sample at once, or waits for its subgroup: the
     // bits are the same, the host measures which is faster.
@@ -82,7 +106,7 @@ void main()
         if (batch.is_together != 0u ? invocation_any(goes_on) : goes_on) {
             continue;
         }
-        if (i < batch.sample_count) {
+        if (i < count) {
             rays += result.rays;
             truncated += result.truncated > 0.0 ? 1u : 0u;
             truncated_throughput += uint(result.truncated * 65536.0 + 0.5);
@@ -101,7 +125,7 @@ void main()
                 node = film_merge(levels[level], node, level);
             }
             i++;
-            if (i == batch.sample_count) {
+            if (i == count) {
                 // a power of two: the last node holds all
                 film_write(at.y * params.window_width + at.x - batch.film_first_pixel, node);
                 // in 32 bits for a pixel, whose samples are few
@@ -113,7 +137,7 @@ void main()
                 }
             }
         }
-        if (i == batch.sample_count) {
+        if (i == count) {
             uint k = kernel_take(is_first);
             if (k == NONE) {
                 break;
@@ -124,8 +148,10 @@ void main()
                 continue;
             }
             i = 0u;
+            exponent = kernel_exponent(at);
+            count = batch.sample_count << exponent;
         }
-        path = kernel_start(i, at);
+        path = kernel_start(i, at, exponent);
         result = path_result();
     }
 

@@ -336,5 +336,6 @@ const uint BIND_PROBE_HITS = 18u;    // storage: ProbeHit[] (probe kernel)
 const uint BIND_PLANES = 19u;        // uniform buffer: Plane[PLANES_MAX] (own BVH)
 const uint BIND_SMALL_NODES = 20u;   // uniform buffer: SMALL_TEXELS of BIND_BVH_NODES, with HAS_SMALL_NODES
 const uint BIND_SMALL_RECORDS = 21u; // uniform buffer: SMALL_TEXELS of BIND_BVH_TRIANGLES, with HAS_SMALL_RECORDS
+const uint BIND_ALLOTMENT = 22u;     // texel buffer R32UI: an exponent for each pixel of the window, with HAS_ALLOTMENT
 
 #endif

@@ -4,7 +4,8 @@
 //! All numbers are little-endian. `MAGIC`; the entries of the header (count u32,
 //! then for each its name, a tag byte, and text or the bits of a double; texts
 //! are a length u32 and UTF-8); window x0, y0, x1, y1, frame width, height and
-//! whether there are sums of the first hit, log₂ of the samples of a block (u32 each); the nodes (count u32, then
+//! whether there are sums of the first hit, log₂ of the samples of a block (u32 each); the exponents of the pixels (count u32,
+//! 0 or that of the pixels, and a byte each); the nodes (count u32, then
 //! for each its first sample u64, level u32 and floats); SHA-256 of all before.
 
 use std::fs::File;
@@ -15,12 +16,12 @@ use std::thread::{self, ScopedJoinHandle};
 use sha2::{Digest, Sha256};
 
 use crate::error::{Error, Result};
-use crate::film::Film;
+use crate::film::{Allotment, Film};
 use crate::image_io::{Metadata, Value, write_with};
 use crate::settings::{Crop, MAX_SIDE};
 
 /// Of every checkpoint; the last byte counts up when the format changes.
-const MAGIC: [u8; 16] = *b"etendue\0chkpt\0\0\x04";
+const MAGIC: [u8; 16] = *b"etendue\0chkpt\0\0\x05";
 /// Bytes of a SHA-256.
 const DIGEST: u64 = 32;
 
@@ -110,6 +111,9 @@ fn write_film(to: &mut dyn Write, film: &Film) -> io::Result<()> {
     for number in [x0, y0, x1, y1, width, height, aovs, film.block_level()] {
         write_u32(to, number)?;
     }
+    let exponents = film.allotment().exponents();
+    write_u32(to, exponents.len() as u32)?;
+    to.write_all(exponents)?;
     write_u32(to, film.nodes().count() as u32)?;
     for (first, level, values) in film.nodes() {
         to.write_all(&first.to_le_bytes())?;
@@ -186,7 +190,9 @@ fn read_film(from: &mut Source<impl Read>) -> io::Result<Film> {
     }
     let window = Crop { x0, y0, x1, y1 };
     let mut film = Film::new(window, (width, height), aovs == 1).with_blocks(block_level);
-    let count = u64::from(x1 - x0) * u64::from(y1 - y0) * film.floats_per_pixel() as u64;
+    let pixels = u64::from(x1 - x0) * u64::from(y1 - y0);
+    let count = pixels * film.floats_per_pixel() as u64;
+    film = film.with_allotment(read_allotment(from, pixels)?);
     for _ in 0..from.u32()? {
         let first = u64::from_le_bytes(from.array()?);
         let level = from.u32()?;
@@ -195,6 +201,19 @@ fn read_film(from: &mut Source<impl Read>) -> io::Result<Film> {
             .map_err(|error| bad(&error.to_string()))?;
     }
     Ok(film)
+}
+
+fn read_allotment(from: &mut Source<impl Read>, pixels: u64) -> io::Result<Allotment> {
+    let count = u64::from(from.u32()?);
+    if count != 0 && count != pixels {
+        return Err(bad("exponents of another window"));
+    }
+    let mut exponents = vec![0; from.claim(count)?];
+    from.fill(&mut exponents)?;
+    if exponents.iter().any(|&e| e > Allotment::MOST) {
+        return Err(bad("impossible exponents"));
+    }
+    Ok(Allotment::from_exponents(exponents))
 }
 
 fn bad(what: &str) -> io::Error {

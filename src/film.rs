@@ -12,6 +12,7 @@
 //! References: \[Chan83\] Chan, Golub, LeVeque: Algorithms for Computing the
 //! Sample Variance, The American Statistician 37 (1983).
 
+mod allotment;
 mod error;
 mod interval;
 
@@ -22,6 +23,8 @@ use std::ops::Range;
 use crate::error::{Error, Result};
 use crate::layout::{BLOCK_LEVEL, FILM_FLOATS, FILM_FLOATS_AOV, NET_LEVEL};
 use crate::settings::{Crop, Settings};
+
+pub use allotment::{Allotment, Budget};
 
 /// One past the largest sample index, so that ends and node sizes fit 64 bits.
 pub const MAX_SAMPLES: u64 = 1 << 63;
@@ -49,6 +52,8 @@ pub struct Film {
     aovs: bool,
     /// log₂ of the samples of a block, whose samples depend on each other; 0: of none.
     block_level: u32,
+    /// Samples of a pixel where the film counts one: levels, counts and blocks of that pixel are so much larger.
+    allotment: Allotment,
     /// By first sample; disjoint, and no two siblings of the same level.
     nodes: BTreeMap<u64, Node>,
 }
@@ -83,6 +88,7 @@ impl Film {
             full,
             aovs,
             block_level: 0,
+            allotment: Allotment::default(),
             nodes: BTreeMap::new(),
         }
     }
@@ -99,6 +105,18 @@ impl Film {
     pub fn with_blocks(mut self, level: u32) -> Self {
         self.block_level = level;
         self
+    }
+
+    /// An empty film whose pixels take different numbers of samples.
+    #[must_use]
+    pub fn with_allotment(mut self, allotment: Allotment) -> Self {
+        self.allotment = allotment;
+        self
+    }
+
+    /// How many samples pixels take where the film counts one.
+    pub fn allotment(&self) -> &Allotment {
+        &self.allotment
     }
 
     /// log₂ of the samples of a block; 0 where samples are independent.
@@ -144,9 +162,27 @@ impl Film {
             .sum()
     }
 
-    /// Number of samples for each pixel.
+    /// Number of samples for each pixel, as the film counts: of a pixel whose exponent is 0.
     pub fn samples(&self) -> u64 {
         self.nodes.values().map(|node| 1 << node.level).sum()
+    }
+
+    /// Number of samples of all pixels together.
+    pub fn paths(&self) -> u64 {
+        self.samples() * self.allotment.taken(self.pixels())
+    }
+
+    /// Samples a pixel on average, rounded down, where the film counts so many.
+    pub fn mean_of(&self, samples: u64) -> u64 {
+        let pixels = self.pixels();
+        let mean = u128::from(samples) * u128::from(self.allotment.taken(pixels)) / pixels as u128;
+        mean as u64
+    }
+
+    /// Number of samples of each pixel.
+    pub fn samples_taken(&self) -> Vec<f32> {
+        let samples = self.samples();
+        self.map_pixels(|pixel| self.count(samples, pixel) as f32)
     }
 
     /// The samples that are in the film: disjoint, in order, as few ranges as possible.
@@ -228,6 +264,10 @@ impl Film {
                 String::from("samples of one film are a net, those of the other independent");
             return settings_error("--estimator", what);
         }
+        if self.allotment != other.allotment {
+            let what = String::from("the films spread their samples in different ways");
+            return settings_error("--adaptive", what);
+        }
         for (&first, node) in &other.nodes {
             self.check(first, node.level, node.values.len())?;
         }
@@ -271,11 +311,11 @@ impl Film {
 
     /// Fraction of samples that hit something, for each pixel; `None` without AOVs.
     pub fn coverage(&self) -> Option<Vec<f32>> {
-        let count = self.samples().max(1) as f64;
+        let samples = self.samples().max(1);
         self.aovs.then(|| {
             self.map_pixels(|pixel| {
                 let [coverage] = self.sum(pixel, COVERAGE);
-                (coverage / count) as f32
+                (coverage / self.count(samples, pixel)) as f32
             })
         })
     }
@@ -298,7 +338,7 @@ impl Film {
         } else {
             None
         };
-        let Some(end) = end.filter(|&end| end <= MAX_SAMPLES) else {
+        let Some(end) = end.filter(|&end| end <= MAX_SAMPLES >> self.allotment.most()) else {
             let what = format!("no node of level {level} starts at sample {first}");
             return settings_error("--samples", what);
         };
@@ -321,7 +361,6 @@ impl Film {
 
     /// Inserts a checked node and merges siblings upwards.
     fn insert(&mut self, mut first: u64, mut level: u32, mut values: Vec<f32>) {
-        let stride = self.floats_per_pixel();
         loop {
             let sibling = first ^ (1 << level);
             if self.nodes.get(&sibling).is_none_or(|n| n.level != level) {
@@ -334,7 +373,7 @@ impl Film {
             } else {
                 (values, other)
             };
-            merge_siblings(&mut values, &right, level, stride, self.block_level);
+            self.merge_siblings(&mut values, &right, level);
             first = first.min(sibling);
             level += 1;
         }
@@ -358,29 +397,63 @@ impl Film {
     }
 
     fn averages(&self, offset: usize) -> Vec<[f32; 3]> {
-        let count = self.samples().max(1) as f64;
-        self.map_pixels(|pixel| self.sum(pixel, offset).map(|s: f64| (s / count) as f32))
+        let samples = self.samples().max(1);
+        self.map_pixels(|pixel| {
+            let count = self.count(samples, pixel);
+            self.sum(pixel, offset).map(|s: f64| (s / count) as f32)
+        })
+    }
+
+    /// Samples of a pixel where the film counts so many.
+    fn count(&self, samples: u64, pixel: usize) -> f64 {
+        samples as f64 * f64::from(1u32 << self.allotment.exponent(pixel))
+    }
+
+    /// Adds the right sibling to the left one, both of `level`.
+    fn merge_siblings(&self, left: &mut [f32], right: &[f32], level: u32) {
+        let steps: Vec<Step> = (0..=self.allotment.most())
+            .map(|exponent| Step::of(level + exponent, self.block_level))
+            .collect();
+        let stride = self.floats_per_pixel();
+        let both = left
+            .chunks_exact_mut(stride)
+            .zip(right.chunks_exact(stride));
+        for (pixel, (a, b)) in both.enumerate() {
+            steps[self.allotment.exponent(pixel) as usize].merge(a, b);
+        }
     }
 }
 
-/// Adds the right sibling to the left one, both with n = 2^level samples. The
-/// shaders do the same below the nodes that they return, in this order and
-/// without fused operations, so the bits do not depend on who merges.
-fn merge_siblings(left: &mut [f32], right: &[f32], level: u32, stride: usize, block: u32) {
-    // [Chan83] Eq. 2.1 for equal counts: M₂ = M₂a + M₂b + (Σa − Σb)² / (2n).
-    // A power of two, hence exact.
-    let scale = 0.5 / (1_u64 << level) as f32;
-    let are_blocks = block > 0 && level == block;
-    let pair = pair_level(block);
-    for (a, b) in left
-        .chunks_exact_mut(stride)
-        .zip(right.chunks_exact(stride))
-    {
+/// How two siblings of a pixel are added.
+struct Step {
+    scale: f32,
+    /// Siblings are blocks.
+    are_blocks: bool,
+    /// Level of their parent beside that of a pair of nets; without nets there is none.
+    pair: Option<Ordering>,
+}
+
+impl Step {
+    /// For siblings of 2^`level` samples, in blocks of 2^`block`.
+    fn of(level: u32, block: u32) -> Self {
+        Self {
+            // A power of two, hence exact.
+            scale: 0.5 / (1_u64 << level) as f32,
+            are_blocks: block > 0 && level == block,
+            pair: (block > 0).then(|| (level + 1).cmp(&pair_level(block))),
+        }
+    }
+
+    /// Adds the right sibling to the left one. The shaders do the same below the nodes that they return, in this order and
+    /// without fused operations, so the bits do not depend on who merges.
+    fn merge(&self, a: &mut [f32], b: &[f32]) {
+        // [Chan83] Eq. 2.1 for equal counts n: M₂ = M₂a + M₂b + (Σa − Σb)² / (2n).
+        let scale = self.scale;
         for channel in 0..3 {
             let d = a[RADIANCE + channel] - b[RADIANCE + channel];
             let within = a[DEVIATIONS + channel] + b[DEVIATIONS + channel];
             let between = a[BETWEEN + channel] + b[BETWEEN + channel];
-            let (within, between) = if are_blocks {
+            let (within, between) = if self.are_blocks {
                 (0.0, d)
             } else {
                 (within, between)
@@ -388,17 +461,30 @@ fn merge_siblings(left: &mut [f32], right: &[f32], level: u32, stride: usize, bl
             a[RADIANCE + channel] += b[RADIANCE + channel];
             a[DEVIATIONS + channel] = within + d * d * scale;
             // Of a pair of nets on, deviations of nets.
-            a[BETWEEN + channel] = match (level + 1).cmp(&pair) {
-                _ if block == 0 => 0.0,
-                Ordering::Less => between,
-                Ordering::Equal => between * between * scale,
-                Ordering::Greater => between + d * d * scale,
+            a[BETWEEN + channel] = match self.pair {
+                None => 0.0,
+                Some(Ordering::Less) => between,
+                Some(Ordering::Equal) => between * between * scale,
+                Some(Ordering::Greater) => between + d * d * scale,
             };
         }
-        for i in ALBEDO..stride {
-            a[i] += b[i];
+        for (a, b) in a.iter_mut().zip(b).skip(ALBEDO) {
+            *a += b;
         }
     }
+}
+
+/// The pixels of a picture that are at most `reach` away along each axis, row by row, the pixel itself included.
+fn rows_around(
+    pixel: usize,
+    width: usize,
+    count: usize,
+    reach: usize,
+) -> impl Iterator<Item = Range<usize>> {
+    let near = |at: usize, end: usize| at.saturating_sub(reach)..(at + reach + 1).min(end);
+    let columns = near(pixel % width, width);
+    near(pixel / width, count / width)
+        .map(move |row| row * width + columns.start..row * width + columns.end)
 }
 
 fn settings_error(name: &'static str, what: String) -> Result<()> {

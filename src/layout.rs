@@ -294,4 +294,5 @@ tags! {
     BIND_PLANES = 19;
     BIND_SMALL_NODES = 20;
     BIND_SMALL_RECORDS = 21;
+    BIND_ALLOTMENT = 22;
 }

@@ -7,6 +7,7 @@ use glam::DVec3;
 
 use crate::error::{Error, Result};
 use crate::layout::BLOCK_LEVEL;
+use crate::mutant;
 
 /// Which traversal answers "what does this ray meet?".
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -171,6 +172,8 @@ pub struct Settings {
     pub sensor: Option<Sensor>,
     /// Also average albedo, normal, depth and coverage of the first hit, and count dropped samples for each pixel.
     pub aovs: bool,
+    /// Pixels may take different numbers of samples ([`crate::film::Allotment`]); `samples` counts those of a pixel with the fewest.
+    pub adaptive: bool,
 }
 
 impl Default for Settings {
@@ -188,9 +191,13 @@ impl Default for Settings {
             camera: None,
             sensor: None,
             aovs: false,
+            adaptive: false,
         }
     }
 }
+
+/// Mixed into the seed of pilots.
+const PILOT_SEED: u64 = 0x9e37_79b9_7f4a_7c15;
 
 /// Largest width or height of a frame: what OpenEXR viewers and 32-bit pixel indices take.
 pub const MAX_SIDE: u32 = 65_536;
@@ -204,6 +211,18 @@ impl Settings {
             x1: self.width,
             y1: self.height,
         })
+    }
+
+    /// The settings of a pilot: its samples are independent of those of the picture.
+    pub fn pilot(&self) -> Self {
+        let other = match mutant::is("spread-itself") {
+            true => 0,
+            false => PILOT_SEED,
+        };
+        Self {
+            seed: self.seed ^ other,
+            ..self.clone()
+        }
     }
 
     /// log₂ of the samples that a net takes in turn; 0 when all are independent.

@@ -64,6 +64,8 @@ pub struct Spec {
     pub small_nodes: bool,
     /// … and so do its records.
     pub small_records: bool,
+    /// Pixels may take different numbers of samples.
+    pub allotment: bool,
 }
 
 /// Features that plain kernels are compiled without (`PLAIN` in `shaders/spec.glsl`): these are half as
@@ -89,6 +91,7 @@ impl Spec {
             sensor: settings.sensor.is_some_and(|s| s.needs_kernel()),
             strata: settings.block_level() > 0,
             strategy: settings.strategy,
+            allotment: settings.adaptive,
             punctual: scene.lights.iter().any(|l| l.intensity.max_element() > 0.0),
             environment: matches!(
                 &scene.environment,
@@ -153,6 +156,7 @@ impl Spec {
             boxes: self.boxes,
             small_nodes: self.small_nodes,
             small_records: self.small_records,
+            allotment: self.allotment,
         }
     }
 
@@ -208,7 +212,8 @@ impl Spec {
                     .into_iter()
                     .chain([strategy, self.parallelograms, self.triangles])
                     .chain([self.texture_kinds])
-                    .chain([self.boxes, self.small_nodes, self.small_records].map(u32::from)),
+                    .chain([self.boxes, self.small_nodes, self.small_records].map(u32::from))
+                    .chain([u32::from(self.allotment)]),
             )
             .collect()
     }

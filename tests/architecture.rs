@@ -17,7 +17,7 @@ const MAY_USE: &[(&str, &[&str])] = &[
     ("gpu", &["error", "fault"]),
     ("bvh", &["error"]),
     ("chart", &[]),
-    ("settings", &["error", "layout"]),
+    ("settings", &["error", "layout", "mutant"]),
     ("mutant", &[]),
     ("scene", &["error", "mutant", "store"]),
     ("tails", &[]),

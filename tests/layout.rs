@@ -110,6 +110,7 @@ fn specialisation_constants_are_the_same_in_rust_and_glsl() {
             "HAS_BOXES",
             "HAS_SMALL_NODES",
             "HAS_SMALL_RECORDS",
+            "HAS_ALLOTMENT",
         ]
         .map(String::from),
     );

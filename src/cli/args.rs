@@ -180,6 +180,10 @@ pub struct RenderArgs {
     /// Global sample indices, A is rendered, B is not: the shard of a larger render
     #[arg(long, value_name = "A..B", conflicts_with = "spp", value_parser = samples)]
     pub samples: Option<Range<u64>>,
+    /// Spread the samples so that noisy pixels take more, as a sixteenth as many other samples tell:
+    /// --spp on average, a quarter of it at least and four times it at most; from 64 on
+    #[arg(long, conflicts_with_all = ["samples", "noise"])]
+    pub adaptive: bool,
 
     /// Width of the frame in pixels [default: 1280, or from the height]
     #[arg(long, value_name = "N", value_parser = side())]

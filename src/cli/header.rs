@@ -72,7 +72,7 @@ impl Record<'_> {
         let features: Vec<_> = features.map(|f| f.name).collect();
         put("features", features.join(" ").into());
         put("samples", ranges(&self.film.ranges()).into());
-        put("spp", count(self.film.samples()));
+        put("spp", count(self.film.mean_of(self.film.samples())));
         put("times.load", self.job.load.into());
         put("times.build", self.report.times.build.into());
         put("times.compile", self.report.times.compile.into());
@@ -154,6 +154,9 @@ impl Job<'_> {
         };
         put("backend", backend.into());
         put("estimator", settings.estimator.name().into());
+        if settings.adaptive {
+            put("adaptive", 1.0.into());
+        }
         let strategy = format!("{:?}", settings.strategy).to_lowercase();
         put("strategy", strategy.into());
         match settings.camera {

@@ -17,6 +17,7 @@ pub const JOB: &[&str] = &[
     "settings.seed",
     "settings.max_depth",
     "settings.estimator",
+    "settings.adaptive",
     "settings.strategy",
     "settings.camera",
     "settings.env_hash",

@@ -77,7 +77,7 @@ pub fn run(args: &MeasureArgs) -> Result<Outcome, Failure> {
     let pilot_share = 1.0 / pilot::MOST as f64;
     if let Some(limit) = args.noise {
         let mut film = Film::of(&settings);
-        renderer.restart(settings.samples.clone(), pilot::seed(args.seed))?;
+        renderer.restart(settings.samples.clone(), settings.pilot().seed)?;
         let needed = pilot::plan(limit, settings.samples.end, |samples| {
             let so_far = std::mem::replace(&mut film, Film::of(&settings));
             let mut control =

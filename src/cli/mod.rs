@@ -19,6 +19,7 @@ mod plan;
 mod progress;
 mod render;
 mod rerender;
+mod samples;
 mod selftest;
 mod settings;
 mod stats;

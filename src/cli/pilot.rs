@@ -13,13 +13,6 @@ const ENOUGH: f64 = 3.0;
 pub const MOST: u64 = 9;
 /// The error to aim at, as a share of the limit: the pilot's error is known to a few percent.
 const AIM: f64 = 0.92;
-/// Mixed into the seed: the pilot's samples are independent of those of the render.
-const OTHER_SEED: u64 = 0x9e37_79b9_7f4a_7c15;
-
-/// The seed of the pilot of a render with this seed.
-pub fn seed(seed: u64) -> u64 {
-    seed ^ OTHER_SEED
-}
 
 /// How many of `total` samples give a relative standard error of `limit`. `error_of` extends the pilot to so many
 /// samples and returns its relative error, or `None` where it was stopped: then there is no plan.

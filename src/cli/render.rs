@@ -1,6 +1,5 @@
 //! `etendue render`: arguments → settings → library → files.
 
-use std::ops::Range;
 use std::path::Path;
 use std::time::Instant;
 
@@ -10,7 +9,6 @@ use etendue::image_io::{
 };
 use etendue::render::{Control, Identities, Progress, Report, Team, Work};
 use etendue::scene::{Environment, Scene, gltf, load_environment};
-use etendue::settings::Settings;
 use etendue::{Error, Result};
 
 use super::args::RenderArgs;
@@ -18,10 +16,11 @@ use super::checkpoint::{self, Cost, Keeper, Saved};
 use super::failure::{Failure, Outcome};
 use super::header::{self, Job, Record, Stop};
 use super::interrupt::Interrupt;
+use super::plan;
 use super::progress::Reporter;
 use super::rerender::Repeat;
+use super::samples::Planner;
 use super::settings::{DEFAULT_SPP, settings};
-use super::{pilot, plan};
 use super::{stats, write_stderr};
 
 /// Renders and writes what was asked for.
@@ -266,56 +265,6 @@ fn introduce(reporter: &Reporter, job: &Job, renderer: &Team) {
     ));
 }
 
-/// The samples of the job; with `--noise`, as many of them as a pilot says.
-fn plan_samples(
-    renderer: &mut Team,
-    job: &Job,
-    begun: Instant,
-    interrupt: &Interrupt,
-    reporter: &Reporter,
-) -> Result<Vec<Range<u64>>> {
-    let all = job.samples();
-    let (Some(limit), None) = (job.args.noise, job.repeats) else {
-        return Ok(all);
-    };
-    let Range { start, end } = job.settings.samples;
-    let pilot = Settings {
-        seed: pilot::seed(job.settings.seed),
-        ..job.settings.clone()
-    };
-    renderer.restart(pilot.samples.clone(), pilot.seed)?;
-    let is_late = || {
-        let time = job.args.time.unwrap_or(f64::INFINITY) / pilot::MOST as f64;
-        interrupt.is_requested() || begun.elapsed().as_secs_f64() >= time
-    };
-    let mut film = Film::of(&pilot);
-    let needed = pilot::plan(limit, end - start, |samples| {
-        let so_far = std::mem::replace(&mut film, Film::of(&pilot));
-        let range = start..start + samples;
-        film = renderer.resume(
-            so_far,
-            Work::default(),
-            &[range],
-            &mut |_| match is_late() {
-                true => Control::Stop,
-                false => Control::Continue,
-            },
-        )?;
-        Ok((film.samples() == samples).then(|| film.relative_error()))
-    })?;
-    renderer.restart(job.settings.samples.clone(), job.settings.seed)?;
-    let Some(needed) = needed else {
-        return Ok(all);
-    };
-    let error = film.relative_error();
-    reporter.note(&format!(
-        "{} other samples have a relative error of {error:.2e}: {needed} are needed",
-        film.samples()
-    ));
-    let planned = start..start + needed;
-    Ok(vec![planned])
-}
-
 /// Renders until the first limit is reached.
 fn render(
     renderer: &mut Team,
@@ -326,7 +275,7 @@ fn render(
     reporter: &mut Reporter,
 ) -> Result<(Film, Stop, Cost)> {
     let begun = Instant::now();
-    let samples = plan_samples(renderer, job, begun, interrupt, reporter)?;
+    let (film, samples) = Planner::new(renderer, job, interrupt).plan(film, reporter)?;
     let mut stop = Stop::Samples;
     let mut keeper = Keeper::new(job, &renderer.report());
     let film = renderer.resume(film, before, &samples, &mut |progress| {
@@ -488,7 +437,8 @@ fn finish(record: &Record, cost: Cost, reporter: &Reporter, start: Instant) -> R
     }
     if result.is_ok() {
         let stop = record.stop_text();
-        reporter.finish(record.film.samples(), &stop, late.total, &written);
+        let samples = record.film.mean_of(record.film.samples());
+        reporter.finish(samples, &stop, late.total, &written);
     }
     result
 }

@@ -32,6 +32,7 @@ pub fn settings(args: &RenderArgs, scene: &Scene) -> Result<Settings> {
         backend: args.backend.into(),
         estimator: args.estimator.into(),
         camera,
+        adaptive: args.adaptive,
         aovs: args.aovs().into_iter().any(Aov::needs_first_hit),
         ..Settings::default()
     };

@@ -51,29 +51,34 @@ impl Film {
         }
     }
 
-    /// Number of independent parts that have as many degrees of freedom as [`Film::standard_error`], which is one less. Not a
-    /// whole number where a pair of nets is not complete beside others.
+    /// Number of independent parts that have as many degrees of freedom as [`Film::standard_error`], which is one less, of a pixel with the
+    /// fewest samples. Not a whole number where a pair of nets is not complete beside others.
     pub fn parts(&self) -> f64 {
-        let parts = self.independent();
+        self.parts_of(0)
+    }
+
+    /// The same of a pixel with this exponent.
+    pub(super) fn parts_of(&self, exponent: u32) -> f64 {
+        let parts = self.independent(exponent);
         match parts.degrees {
             0.0 => parts.blocks,
             degrees => parts.blocks.min(degrees + DEGREES + 1.0),
         }
     }
 
-    /// What of the film is independent of what.
-    fn independent(&self) -> Parts {
+    /// What of a pixel with this exponent is independent of what.
+    fn independent(&self, exponent: u32) -> Parts {
         let whole_blocks = |level: u32| {
             level
                 .checked_sub(self.block_level)
                 .map_or(0_u64, |more| 1 << more)
         };
-        let levels = || self.nodes.values().map(|node| node.level);
+        let levels = || self.nodes.values().map(|node| node.level + exponent);
         let has_blocks = levels().map(whole_blocks).sum::<u64>() >= 2;
         let blocks = if has_blocks {
             levels().map(|level| whole_blocks(level).max(1)).sum()
         } else {
-            self.samples()
+            self.samples() << exponent
         };
         let mut parts = Parts {
             has_blocks,
@@ -105,9 +110,12 @@ impl Film {
 
     /// Mean and standard error of the radiance of each pixel.
     pub(super) fn moments(&self) -> impl Iterator<Item = ([f64; 3], [f64; 3])> + '_ {
-        let parts = self.independent();
+        let parts: Vec<Parts> = (0..=self.allotment.most())
+            .map(|exponent| self.independent(exponent))
+            .collect();
         (0..self.pixels()).map(move |pixel| {
-            let [red, green, blue] = [0, 1, 2].map(|channel| self.moment(pixel, channel, &parts));
+            let parts = &parts[self.allotment.exponent(pixel) as usize];
+            let [red, green, blue] = [0, 1, 2].map(|channel| self.moment(pixel, channel, parts));
             ([red.0, green.0, blue.0], [red.1, green.1, blue.1])
         })
     }
@@ -115,19 +123,21 @@ impl Film {
     /// Mean and standard error of one channel of a pixel's radiance.
     fn moment(&self, pixel: usize, channel: usize, parts: &Parts) -> (f64, f64) {
         let start = pixel * self.floats_per_pixel() + channel;
+        let exponent = self.allotment.exponent(pixel);
         let (mut all, mut nets) = (Spread::default(), Spread::default());
         let mut difference = 0.0;
         for node in self.nodes.values() {
             let float = |part: usize| f64::from(node.values[start + part]);
-            let count = (1_u64 << node.level) as f64;
+            let level = node.level + exponent;
+            let count = (1_u64 << level) as f64;
             // Deviations within a block say nothing about how blocks differ.
-            let counts = !parts.has_blocks || node.level > self.block_level;
+            let counts = !parts.has_blocks || level > self.block_level;
             let own = if counts { float(DEVIATIONS) } else { 0.0 };
             all.add(count, float(RADIANCE), own);
             if parts.degrees == 0.0 {
                 continue;
             }
-            if node.level >= pair_level(self.block_level) {
+            if level >= pair_level(self.block_level) {
                 nets.add(count, float(RADIANCE), float(BETWEEN));
             } else {
                 difference += float(BETWEEN);

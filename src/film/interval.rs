@@ -10,9 +10,7 @@
 //! References: \[Smyth04\] G. K. Smyth: Linear models and empirical Bayes methods for assessing differential
 //! expression in microarray experiments, Statistical Applications in Genetics and Molecular Biology 3 (2004).
 
-use std::ops::Range;
-
-use super::Film;
+use super::{Film, rows_around};
 use crate::tails::student_quantile;
 
 /// Pixels to each side that may be asked.
@@ -33,11 +31,14 @@ impl Film {
             0.0 < confidence && confidence < 1.0,
             "a confidence of {confidence}"
         );
-        let degrees = self.parts() - 1.0;
-        if degrees < 1.0 {
-            return vec![[f32::INFINITY; 3]; self.pixels()];
-        }
-        let quantile = student_quantile(1.0 - confidence, degrees + WEIGHT);
+        // by exponent; none where nothing is known
+        let students: Vec<Option<(f64, f64)>> = (0..=self.allotment.most())
+            .map(|exponent| {
+                let degrees = self.parts_of(exponent) - 1.0;
+                let quantile = || student_quantile(1.0 - confidence, degrees + WEIGHT);
+                (degrees >= 1.0).then(|| (degrees, quantile()))
+            })
+            .collect();
         let moments: Vec<_> = self.moments().collect();
         let width = (self.window.x1 - self.window.x0) as usize;
         let mut half = vec![[0.0; 3]; self.pixels()];
@@ -52,6 +53,11 @@ impl Film {
             let brightness = medians(&own, width);
             for (pixel, half) in half.iter_mut().enumerate() {
                 let Moments { mean, variance } = own[pixel];
+                let student = students[self.allotment.exponent(pixel) as usize];
+                let Some((degrees, quantile)) = student else {
+                    half[channel] = f32::INFINITY;
+                    continue;
+                };
                 let prior = relative_variance(&own, &brightness, width, pixel) * mean * mean;
                 let moderated = (degrees * variance + WEIGHT * prior) / (degrees + WEIGHT);
                 half[channel] = (quantile * moderated.sqrt()) as f32;
@@ -96,19 +102,6 @@ fn relative_variance(own: &[Moments], brightness: &[f64], width: usize, pixel: u
         }
     }
     if square > 0.0 { variance / square } else { 0.0 }
-}
-
-/// The pixels of a picture that are at most `reach` away along each axis, row by row, the pixel itself included.
-fn rows_around(
-    pixel: usize,
-    width: usize,
-    count: usize,
-    reach: usize,
-) -> impl Iterator<Item = Range<usize>> {
-    let near = |at: usize, end: usize| at.saturating_sub(reach)..(at + reach + 1).min(end);
-    let columns = near(pixel % width, width);
-    near(pixel / width, count / width)
-        .map(move |row| row * width + columns.start..row * width + columns.end)
 }
 
 #[cfg(test)]

@@ -233,7 +233,7 @@ fn push_aov(channels: &mut Vec<Channel>, film: &Film, aov: Aov) -> Option<()> {
     match aov {
         Aov::Depth => single("depth.Z", film.depth()?),
         Aov::Coverage => single("coverage", film.coverage()?),
-        Aov::Samples => single("samples", vec![film.samples() as f32; film.pixels()]),
+        Aov::Samples => single("samples", film.samples_taken()),
         Aov::Dropped => single("dropped", film.dropped()?),
         Aov::Albedo => push_vectors(channels, names(rgb), film.albedo()?),
         Aov::Normal => push_vectors(channels, names(xyz), film.normal()?),

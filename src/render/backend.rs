@@ -15,6 +15,9 @@ pub(super) trait Backend: Send {
 
     fn set_seed(&mut self, seed: u64) -> Result<()>;
 
+    /// Gives each pixel of the window its exponent, where the kernel is made for that.
+    fn set_allotment(&self, exponents: &[u32]) -> Result<()>;
+
     /// What the kernels read, and bytes of the film buffer.
     fn frame(&self) -> Frame<'_>;
 

@@ -2,6 +2,7 @@
 //! collects the film. A render is a pure function of (scene, settings); batch
 //! sizes, and stopping and going on, do not change a bit of it.
 
+mod allot;
 mod backend;
 mod boxes;
 mod cache;
@@ -35,7 +36,7 @@ use std::path::PathBuf;
 use std::time::Instant;
 
 use crate::error::{Error, Result};
-use crate::film::Film;
+use crate::film::{Allotment, Film};
 use crate::gpu::{self, Caps};
 use crate::layout::{ProbeHit, ProbeRay};
 use crate::scene::Scene;
@@ -84,6 +85,7 @@ pub struct Renderer {
     tiles_per_batch: u32,
     pace: Pace,
     owners: Vec<Owner>,
+    allotment: Allotment,
     report: Report,
     /// The complete passes of a render that failed.
     finished: Option<(Film, Work)>,
@@ -185,6 +187,7 @@ impl Renderer {
             tiles_per_batch: FIRST_BATCH_TILES.min(tuning.max_tiles),
             pace: Pace::default(),
             owners: data.geometry.owners,
+            allotment: Allotment::default(),
             report,
             finished: None,
         })
@@ -210,9 +213,8 @@ impl Renderer {
     /// # Errors
     /// The device fails.
     pub fn render(&mut self, control: &mut dyn FnMut(&Progress) -> Control) -> Result<Film> {
-        let film = Film::of(&self.settings);
         let samples = self.settings.samples.clone();
-        self.resume(film, Work::default(), &[samples], control)
+        self.resume(self.empty_film(), Work::default(), &[samples], control)
     }
 
     /// As [`Self::render`], but goes on with `film`, which `before` was spent on,
@@ -230,7 +232,7 @@ impl Renderer {
         control: &mut dyn FnMut(&Progress) -> Control,
     ) -> Result<Film> {
         // refuses a film of other settings, and says what differs
-        film.merge(Film::of(&self.settings))?;
+        film.merge(self.empty_film())?;
         let mut work = before;
         let start = Instant::now();
         let result = self.passes(&mut film, &mut work, samples, start, control);
@@ -260,7 +262,8 @@ impl Renderer {
         let total = samples_before + missing.iter().map(|r| r.end - r.start).sum::<u64>();
         let params = self.backend.frame().params;
         let pixels = u64::from(params.window_width) * u64::from(params.window_height);
-        let mut passes = Passes::new(missing, pixels, self.tuning.max_pass);
+        let most = self.tuning.max_pass >> self.allotment.most();
+        let mut passes = Passes::new(missing, pixels, most);
         while let Some((first, level)) = passes.upcoming() {
             let pass_start = Instant::now();
             let done = (samples_before + passes.done()) as f64;
@@ -269,9 +272,9 @@ impl Renderer {
                 control(&Progress {
                     film,
                     work: *work,
-                    samples_before,
-                    samples_done: film.samples(),
-                    samples_total: total,
+                    samples_before: film.mean_of(samples_before),
+                    samples_done: film.mean_of(film.samples()),
+                    samples_total: film.mean_of(total),
                     fraction: (done + share * size) / total as f64,
                     pass_complete,
                     elapsed: start.elapsed(),

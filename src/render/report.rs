@@ -156,7 +156,7 @@ impl Report {
     /// Takes down what a render of `seconds` came to.
     pub(super) fn note(&mut self, film: &Film, work: &Work, seconds: f64) {
         self.times.render = seconds;
-        self.paths = film.samples() * film.pixels() as u64;
+        self.paths = film.paths();
         (self.rays, self.ledger) = (work.rays, work.ledger);
     }
 }

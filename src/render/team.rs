@@ -17,7 +17,7 @@ use super::{
 };
 use crate::error::{Error, Result};
 use crate::fault;
-use crate::film::Film;
+use crate::film::{Allotment, Film};
 use crate::scene::Scene;
 use crate::settings::Settings;
 
@@ -26,8 +26,9 @@ const PATIENCE: Duration = Duration::from_millis(100);
 
 /// Devices that render one scene together. With one of them it is a [`Renderer`].
 pub struct Team {
-    members: Vec<Renderer>,
+    pub(super) members: Vec<Renderer>,
     settings: Settings,
+    pub(super) allotment: Allotment,
     report: Report,
     /// The complete passes of a render that failed.
     finished: Option<(Film, Work)>,
@@ -89,6 +90,7 @@ impl Team {
         Ok(Self {
             members,
             settings: settings.clone(),
+            allotment: Allotment::default(),
             report,
             finished: None,
         })
@@ -133,7 +135,7 @@ impl Team {
             return result;
         }
         // refuses a film of other settings, and says what differs
-        film.merge(Film::of(&self.settings))?;
+        film.merge(Film::of(&self.settings).with_allotment(self.allotment.clone()))?;
         let mut work = before;
         let start = Instant::now();
         let result = self.rounds(&mut film, &mut work, samples, start, control);
@@ -181,9 +183,9 @@ impl Team {
             control(&Progress {
                 film,
                 work: *work,
-                samples_before,
-                samples_done: film.samples(),
-                samples_total: total,
+                samples_before: film.mean_of(samples_before),
+                samples_done: film.mean_of(film.samples()),
+                samples_total: film.mean_of(total),
                 fraction: film.samples() as f64 / total as f64,
                 pass_complete,
                 elapsed: start.elapsed(),
@@ -281,7 +283,7 @@ fn listen(
 impl Renderer {
     /// Takes passes and renders them until none is left or `stop` is set.
     fn serve(&mut self, number: usize, queue: &Queue, stop: &AtomicBool, sender: &Sender<Word>) {
-        let (mut done, mut limit) = (0u64, MAX_PASS_LEVEL);
+        let (mut done, mut limit) = (0u64, MAX_PASS_LEVEL - self.allotment.most());
         while !stop.load(Ordering::Relaxed) {
             let Some((first, level)) = queue.take(limit.min((done + 1).ilog2())) else {
                 return;

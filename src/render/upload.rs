@@ -76,6 +76,14 @@ impl SceneData {
         (4 * self.texels.len() + 16 * self.env_map.len() + 8 * self.env_table.len()) as u64
     }
 
+    /// Pixels that each have an exponent of their own.
+    pub fn allotted_pixels(&self) -> usize {
+        match self.spec.allotment {
+            true => self.params.window_width as usize * self.params.window_height as usize,
+            false => 0,
+        }
+    }
+
     /// Bytes of the lists that are neither geometry nor textures.
     pub fn table_bytes(&self) -> u64 {
         let bytes = size_of_val(&self.params)
@@ -83,7 +91,8 @@ impl SceneData {
             + size_of_val(self.materials.as_slice())
             + size_of_val(self.media.as_slice())
             + size_of_val(self.texture_uses.as_slice())
-            + size_of_val(self.lights.as_slice());
+            + size_of_val(self.lights.as_slice())
+            + size_of::<u32>() * self.allotted_pixels();
         bytes as u64
     }
 

@@ -209,6 +209,17 @@ impl VulkanBackend {
                     false,
                 )?,
             ),
+            (
+                layout::BIND_ALLOTMENT,
+                BindingKind::Texel,
+                texel(
+                    device,
+                    "allotment",
+                    TexelFormat::R32Uint,
+                    &vec![0u32; data.allotted_pixels()],
+                    false,
+                )?,
+            ),
         ];
 
         let film = Buffer::new(
@@ -256,6 +267,14 @@ impl VulkanBackend {
     }
 }
 
+impl VulkanBackend {
+    fn shared(&self, binding: u32) -> &Buffer {
+        let mut inputs = self.shared.iter();
+        let input = inputs.find(|(at, _, _)| *at == binding);
+        &input.expect("every kernel has it").2
+    }
+}
+
 impl Backend for VulkanBackend {
     fn memory(&self) -> Memory {
         self.memory
@@ -272,10 +291,11 @@ impl Backend for VulkanBackend {
     fn set_seed(&mut self, seed: u64) -> Result<()> {
         self.params.seed_low = seed as u32;
         self.params.seed_high = (seed >> 32) as u32;
-        let mut inputs = self.shared.iter();
-        let params = inputs.find(|(at, _, _)| *at == layout::BIND_PARAMS);
-        let (_, _, buffer) = params.expect("every kernel reads the parameters");
-        buffer.write(0, &[self.params])
+        self.shared(layout::BIND_PARAMS).write(0, &[self.params])
+    }
+
+    fn set_allotment(&self, exponents: &[u32]) -> Result<()> {
+        self.shared(layout::BIND_ALLOTMENT).write(0, exponents)
     }
 
     fn frame(&self) -> Frame<'_> {

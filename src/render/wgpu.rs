@@ -35,6 +35,9 @@ pub(super) struct WgpuBackend {
 impl WgpuBackend {
     /// On the device of these `caps`, by one of the ways through wgpu.
     pub fn new(caps: &Caps, way: BackendChoice, data: &SceneData, tuning: &Tuning) -> Result<Self> {
+        if data.spec.allotment {
+            return Err(no_allotment());
+        }
         let device = Device::open(&caps.name, way)?;
         let is_cpu = caps.kind == DeviceKind::Cpu;
         let mut params = data.params;
@@ -140,6 +143,11 @@ impl Backend for WgpuBackend {
         Ok(())
     }
 
+    /// Its kernel is made for none.
+    fn set_allotment(&self, _: &[u32]) -> Result<()> {
+        Err(no_allotment())
+    }
+
     fn frame(&self) -> Frame<'_> {
         Frame {
             params: &self.params,
@@ -186,6 +194,15 @@ impl Backend for WgpuBackend {
     /// Vulkan's layer watches our own device only.
     fn validation_messages(&self) -> Vec<String> {
         Vec::new()
+    }
+}
+
+fn no_allotment() -> Error {
+    Error::Unsupported {
+        what: String::from("--adaptive through wgpu"),
+        missing: String::from(
+            "kernels for it give all pixels as many samples; take the bvh backend",
+        ),
     }
 }
 

@@ -19,6 +19,11 @@ fn what_cannot_be_meant_is_a_usage_error() {
         ("render s.gltf -o a.exr --time 0", "above 0"),
         ("render s.gltf -o a.exr --time nan", "above 0"),
         ("render s.gltf -o a.exr --noise -1", "above 0"),
+        ("render s.gltf -o a.exr --adaptive --noise 0.1", "--noise"),
+        (
+            "render s.gltf -o a.exr --adaptive --samples 0..64",
+            "--samples",
+        ),
         ("render s.gltf -o a.exr --width 0", "--width"),
         ("render s.gltf -o a.exr --height 65537", "--height"),
         ("render s.gltf -o a.exr --crop 0,0,5", "four pixel"),

@@ -1,6 +1,7 @@
 //! A render is a pure function of the scene and the settings, to the bit.
 
-use etendue::film::Film;
+use etendue::error::Error;
+use etendue::film::{Allotment, Film};
 use etendue::render::{Control, DeviceOptions, Renderer, Study, Tuning, Workshop};
 use etendue::scene::{LightKind, PunctualLight, Scene};
 use etendue::settings::{BackendChoice, Crop, Settings};
@@ -226,4 +227,79 @@ fn merged_films_are_the_film_of_all_samples() {
         merged.merge(part(10..SAMPLES).unwrap()).unwrap();
         assert!(bits(&merged) == bits(&whole), "{backend:?}");
     }
+}
+
+/// Pixels take 1 to 16 samples where the film counts one, by every traversal, from the third on: each has the bits of an
+/// even picture of so many times the samples.
+#[test]
+fn pixels_that_take_more_samples_have_the_bits_of_longer_renders() {
+    const RANGE: std::ops::Range<u64> = 3..21;
+    let exponents: Vec<u8> = (0..SIDE * SIDE).map(|p| (p * 7 % 5) as u8).collect();
+    let allotment = Allotment::from_exponents(exponents.clone());
+    for backend in offered() {
+        for max_pass in [256, 2] {
+            let adaptive = Settings {
+                samples: RANGE,
+                adaptive: true,
+                ..plain(backend)
+            };
+            let tuning = Tuning {
+                max_pass,
+                max_tiles: 5,
+                ..Tuning::default()
+            };
+            let Some(mut renderer) = open(&corner(), &adaptive, tuning) else {
+                continue;
+            };
+            renderer.allot(&allotment).unwrap();
+            let spread = renderer.render(&mut |_| Control::Continue).unwrap();
+            let paths = renderer.report().paths;
+            assert_eq!(paths, 18 * exponents.iter().map(|e| 1 << e).sum::<u64>());
+            for e in 0..5 {
+                let even = Settings {
+                    samples: RANGE.start << e..RANGE.end << e,
+                    adaptive: false,
+                    ..adaptive.clone()
+                };
+                let even = film(&even, Tuning::default()).unwrap();
+                let own = |film: &Film| -> Vec<_> {
+                    let (mean, error) = (film.mean(), film.standard_error());
+                    let (albedo, depth) = (film.albedo().unwrap(), film.depth().unwrap());
+                    let chosen = (0..exponents.len()).filter(|p| exponents[*p] == e);
+                    chosen
+                        .map(|p| (mean[p], error[p], albedo[p], depth[p]))
+                        .collect()
+                };
+                assert!(own(&spread) == own(&even), "{backend:?} {max_pass} {e}");
+            }
+        }
+    }
+}
+
+#[test]
+fn samples_are_spread_only_where_they_can_be() {
+    let bvh = plain(BackendChoice::Bvh);
+    let Some(mut renderer) = open(&corner(), &bvh, Tuning::default()) else {
+        return;
+    };
+    let refused = |result: etendue::Result<()>| matches!(result, Err(Error::Settings { name, .. }) if name == "--adaptive");
+    assert!(refused(renderer.allot(&Allotment::default())));
+    let adaptive = Settings {
+        adaptive: true,
+        ..bvh
+    };
+    let mut renderer = open(&corner(), &adaptive, Tuning::default()).unwrap();
+    assert!(refused(
+        renderer.allot(&Allotment::from_exponents(vec![1; 3]))
+    ));
+    // too few to be spread
+    assert_eq!(renderer.spread(63).unwrap(), 63);
+    assert_eq!(renderer.spread(64).unwrap(), 16);
+    let film = renderer.render(&mut |_| Control::Continue).unwrap();
+    assert!(film.allotment().most() > 0);
+    // the same again, from a pilot of its own
+    let first = film.allotment().clone();
+    renderer.spread(64).unwrap();
+    let again = renderer.render(&mut |_| Control::Continue).unwrap();
+    assert!(again.allotment() == &first && bits(&again) == bits(&film));
 }

@@ -63,6 +63,22 @@ pub const MUTANTS: &[Mutant] = &[
         killers: &["integrator::closed::closed_room_sums_the_series"],
     },
     Mutant {
+        name: "spread-index",
+        wrong: "pixels that take more samples take those of the pass",
+        file: "shaders/kernel_path.glsl",
+        edits: &[("        low <<= exponent;", "        low <<= 0u;")],
+        killers: &[
+            "integrator::determinism::pixels_that_take_more_samples_have_the_bits_of_longer_renders",
+        ],
+    },
+    Mutant {
+        name: "spread-itself",
+        wrong: "samples of the picture tell which pixels take more",
+        file: "src/settings.rs",
+        edits: &[],
+        killers: &["integrator::analytic::spread_samples_are_not_biased"],
+    },
+    Mutant {
         name: "depth-eight",
         wrong: "paths end after eight scatterings",
         file: "shaders/path.glsl",
@@ -170,10 +186,7 @@ pub const MUTANTS: &[Mutant] = &[
         name: "sample-zero-twice",
         wrong: "the first sample is counted twice and the second never",
         file: "shaders/kernel_path.glsl",
-        edits: &[(
-            "batch.first_sample_low + i, batch.first_sample_high);",
-            "batch.first_sample_low + (i == 1u ? 0u : i), batch.first_sample_high);",
-        )],
+        edits: &[("low + i, high);", "low + (i == 1u ? 0u : i), high);")],
         killers: &[
             "integrator::determinism::same_seed_gives_the_same_bits_however_the_work_is_cut",
         ],
@@ -182,10 +195,7 @@ pub const MUTANTS: &[Mutant] = &[
         name: "shard-seed",
         wrong: "every pass and every shard draws the same numbers",
         file: "shaders/kernel_path.glsl",
-        edits: &[(
-            "batch.first_sample_low + i, batch.first_sample_high);",
-            "i, batch.first_sample_high);",
-        )],
+        edits: &[("low + i, high);", "i, high);")],
         killers: &[
             "integrator::determinism::same_seed_gives_the_same_bits_however_the_work_is_cut",
         ],

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use etendue::checkpoint;
 use etendue::error::Error;
-use etendue::film::Film;
+use etendue::film::{Allotment, Film};
 use etendue::image_io::Metadata;
 use etendue::settings::Crop;
 use sha2::{Digest, Sha256};
@@ -20,7 +20,8 @@ fn film() -> Film {
         x1: 4,
         y1: 2,
     };
-    let mut film = Film::new(window, (5, 3), false);
+    let allotment = Allotment::from_exponents(vec![0, 4, 1, 2, 3, 0]);
+    let mut film = Film::new(window, (5, 3), false).with_allotment(allotment);
     for (first, level) in [(1, 0), (4, 2), (32, 5)] {
         let values = (0..54).map(|i| (hash(first + i) % 1000) as f32).collect();
         film.add(first, level, values).unwrap();
@@ -50,6 +51,7 @@ fn checkpoints_hold_everything() {
     let (read_header, read_film) = checkpoint::read(&path).unwrap();
     assert_eq!(read_header, header());
     assert!(bits(&read_film) == bits(&film()));
+    assert_eq!(read_film.allotment(), film().allotment());
     assert_eq!(read_film.window(), film().window());
     assert_eq!(read_film.full_size(), (5, 3));
     let empty = Film::new(film().window(), (5, 3), true);

@@ -235,3 +235,39 @@ fn kill(signal: &str, process: u32) {
         .status();
     assert!(sent.unwrap().success());
 }
+
+/// Where samples are spread, a render that goes on keeps the spread of the checkpoint.
+#[test]
+fn spread_samples_go_on_as_they_were_spread() {
+    if !has_device() {
+        return;
+    }
+    let folder = scene();
+    let all = "--width 32 --adaptive --aov stderr,samples,albedo";
+    render(&folder, &format!("-o whole.exr {all} --spp 192"));
+    let saved = format!("{all} --checkpoint c.ck --resume -o a.exr");
+    render(&folder, &format!("{saved} --spp 64"));
+    let output = render(&folder, &format!("{saved} --spp 192"));
+    assert!(stderr(&output).contains("going on from samples 0..16"));
+    let (whole, a) = (read(&folder, "whole.exr"), read(&folder, "a.exr"));
+    assert!(whole.channels == a.channels);
+    // 192 a pixel on average, and not the same everywhere
+    let taken = whole.channel("samples").unwrap();
+    let mean = taken.iter().sum::<f32>() / taken.len() as f32;
+    assert!((185.0..=192.0).contains(&mean), "{mean}");
+    let bounds = [48.0, 768.0];
+    assert!(taken.iter().all(|n| (bounds[0]..=bounds[1]).contains(n)));
+    assert!(taken.iter().any(|n| *n != taken[0]));
+
+    let even = saved.replace("--adaptive", "");
+    let output = etendue(
+        &format!("render scene.gltf {even} --spp 192"),
+        folder.path(),
+    );
+    assert!(!output.status.success());
+    assert!(
+        stderr(&output).contains("settings.adaptive"),
+        "{}",
+        stderr(&output)
+    );
+}

@@ -89,6 +89,12 @@ fn the_program_takes_several_devices() {
     assert!(output.status.success(), "{}", stderr(&output));
     assert!(read(&folder, "again.exr").channels == one.channels);
 
+    // the pilot, and the samples that it spreads
+    let all = "--width 32 --spp 96 --adaptive --aov stderr,samples";
+    render(&folder, &format!("-o one.exr {all} --device 0"));
+    render(&folder, &format!("-o two.exr {all} --device 0,0,0"));
+    assert!(read(&folder, "two.exr").channels == read(&folder, "one.exr").channels);
+
     // a number is no part of a name, of which lavapipe's has "256 bits" and LLVM's version
     for number in 6..10 {
         let line = format!("render scene.gltf -o a.exr --width 8 --spp 1 --device 0,{number}");

@@ -4,9 +4,9 @@ use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
 use etendue::film::MAX_SAMPLES;
-use etendue::settings::Estimator;
+use etendue::settings::{Estimator, Settings};
 
-use super::super::args::{Backend, EstimatorName, side};
+use super::super::args::{Backend, side};
 use super::super::numbers::positive;
 
 /// `etendue bench`
@@ -32,9 +32,9 @@ pub struct BenchArgs {
     /// Samples a pixel of the reference [default: 128 times the most]
     #[arg(long, value_name = "SPP", value_parser = clap::value_parser!(u64).range(2..=MAX_SAMPLES))]
     pub reference: Option<u64>,
-    /// Estimators that take part, separated by commas
-    #[arg(long, value_name = "LIST", value_delimiter = ',', value_enum, default_values_t = [EstimatorName::Full, EstimatorName::Textbook])]
-    pub estimators: Vec<EstimatorName>,
+    /// Ways of our own that take part, separated by commas
+    #[arg(long, value_name = "LIST", value_delimiter = ',', value_enum, default_values_t = [WayName::Full, WayName::Textbook])]
+    pub estimators: Vec<WayName>,
     /// Other renderers as well: the folder of their scripts, *_peer.py
     #[arg(long, value_name = "FOLDER", num_args = 0..=1, require_equals = true, default_missing_value = "benches/peers")]
     pub peers: Option<PathBuf>,
@@ -74,10 +74,37 @@ pub struct BenchArgs {
     pub quiet: bool,
 }
 
-impl BenchArgs {
-    /// The estimators asked for.
-    pub fn estimators(&self) -> impl Iterator<Item = Estimator> {
-        self.estimators.iter().map(|name| Estimator::from(*name))
+/// `--estimators`
+#[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum WayName {
+    /// The full estimator
+    Full,
+    /// The yardstick
+    Textbook,
+    /// The full estimator, whose samples are spread over the pixels by a pilot, which counts
+    Adaptive,
+}
+
+impl WayName {
+    /// The name in files.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Full => "full",
+            Self::Textbook => "textbook",
+            Self::Adaptive => "adaptive",
+        }
+    }
+
+    /// Settings of renders this way.
+    pub fn settings(self, settings: &Settings) -> Settings {
+        Settings {
+            estimator: match self {
+                Self::Full | Self::Adaptive => Estimator::Full,
+                Self::Textbook => Estimator::Textbook,
+            },
+            adaptive: self == Self::Adaptive,
+            ..settings.clone()
+        }
     }
 }
 

@@ -3,6 +3,7 @@
 use std::cell::RefCell;
 use std::path::Path;
 use std::rc::Rc;
+use std::time::Instant;
 
 use etendue::Result;
 use etendue::film::Film;
@@ -29,6 +30,8 @@ pub enum Contender {
     Own {
         name: String,
         renderer: Box<Renderer>,
+        /// A pilot spreads the samples over the pixels.
+        is_adaptive: bool,
     },
     /// Another one.
     Peer {
@@ -51,14 +54,28 @@ impl Contender {
 
     pub fn render(&mut self, spp: u64, seed: u64, scratch: &Path) -> Result<Shot, Failure> {
         match self {
-            Self::Own { renderer, .. } => {
-                let film = render_all(renderer, spp, seed)?;
+            Self::Own {
+                renderer,
+                is_adaptive,
+                ..
+            } => {
+                let (mut samples, mut seconds, mut rays) = (spp, 0.0, 0);
+                if *is_adaptive {
+                    let start = Instant::now();
+                    renderer.restart(0..spp, seed)?;
+                    samples = renderer.spread(spp)?;
+                    if samples < spp {
+                        seconds = start.elapsed().as_secs_f64();
+                        rays = renderer.report().rays;
+                    }
+                }
+                let film = render_all(renderer, samples, seed)?;
                 let report = renderer.report();
                 Ok(Shot {
                     picture: film.mean(),
                     spp,
-                    seconds: report.times.render,
-                    rays: Some(report.rays),
+                    seconds: seconds + report.times.render,
+                    rays: Some(rays + report.rays),
                 })
             }
             Self::Peer {

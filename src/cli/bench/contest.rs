@@ -10,10 +10,10 @@ use etendue::film::Film;
 use etendue::image_io::{Channel, Image, Metadata, Tone, write_png};
 use etendue::render::{DeviceOptions, Renderer};
 use etendue::scene::Scene;
-use etendue::settings::{Estimator, Settings};
+use etendue::settings::Settings;
 
 use super::super::failure::{FAILED, Failure};
-use super::args::BenchArgs;
+use super::args::{BenchArgs, WayName};
 use super::contender::{Contender, render_all, warm_up};
 use super::error::{Picture, Reference, mean};
 use super::peer::Peer;
@@ -56,10 +56,10 @@ impl Contest<'_> {
     pub fn run(&self, peers: &[Rc<RefCell<Peer>>], out: &mut Output) -> Result<(), Failure> {
         let name = scene_name(self.path);
         let mut contenders = Vec::new();
-        for estimator in self.args.estimators() {
-            contenders.push(self.own(estimator, &name, out)?);
+        for way in &self.args.estimators {
+            contenders.push(self.own(*way, &name, out)?);
         }
-        let mut judge = self.renderer(Estimator::Full)?;
+        let mut judge = self.renderer(WayName::Full)?;
         let ladder = self.ladder(&mut judge)?;
         let most = ladder.iter().copied().max().unwrap_or(1);
         let spp = self.args.reference.unwrap_or(REFERENCE_FACTOR * most);
@@ -80,24 +80,16 @@ impl Contest<'_> {
         self.compete(&name, &ladder, &mut contenders, &truth, out)
     }
 
-    fn renderer(&self, estimator: Estimator) -> Result<Renderer, Failure> {
-        let settings = Settings {
-            estimator,
-            ..self.settings.clone()
-        };
+    fn renderer(&self, way: WayName) -> Result<Renderer, Failure> {
+        let settings = way.settings(self.settings);
         Ok(Renderer::new(self.scene, &settings, self.options)?)
     }
 
-    fn own(
-        &self,
-        estimator: Estimator,
-        scene: &str,
-        out: &mut Output,
-    ) -> Result<Contender, Failure> {
-        let mut renderer = self.renderer(estimator)?;
+    fn own(&self, way: WayName, scene: &str, out: &mut Output) -> Result<Contender, Failure> {
+        let mut renderer = self.renderer(way)?;
         warm_up(&mut renderer)?;
         let times = renderer.report().times;
-        let name = format!("etendue {}", estimator.name());
+        let name = format!("etendue {}", way.name());
         out.line(&Line::Start(Start {
             scene: scene.to_owned(),
             contender: name.clone(),
@@ -109,6 +101,7 @@ impl Contest<'_> {
         Ok(Contender::Own {
             name,
             renderer: Box::new(renderer),
+            is_adaptive: way == WayName::Adaptive,
         })
     }
 

@@ -5,6 +5,8 @@
     reason = "the ranges of a film are a list of ranges"
 )]
 
+mod allotment;
+
 use std::ops::Range;
 
 use etendue::Error;
