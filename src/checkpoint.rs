@@ -4,8 +4,8 @@
 //! All numbers are little-endian. `MAGIC`; the entries of the header (count u32,
 //! then for each its name, a tag byte, and text or the bits of a double; texts
 //! are a length u32 and UTF-8); window x0, y0, x1, y1, frame width, height and
-//! whether there are sums of the first hit, log₂ of the samples of a block (u32 each); the exponents of the pixels (count u32,
-//! 0 or that of the pixels, and a byte each); the nodes (count u32, then
+//! whether there are sums of the first hit, log₂ of the samples of a block (u32 each); samples of the pilot (u64) and the
+//! exponents of the pixels (count u32, 0 or that of the pixels, and a byte each); the nodes (count u32, then
 //! for each its first sample u64, level u32 and floats); SHA-256 of all before.
 
 use std::fs::File;
@@ -112,6 +112,7 @@ fn write_film(to: &mut dyn Write, film: &Film) -> io::Result<()> {
         write_u32(to, number)?;
     }
     let exponents = film.allotment().exponents();
+    to.write_all(&film.allotment().pilot().to_le_bytes())?;
     write_u32(to, exponents.len() as u32)?;
     to.write_all(exponents)?;
     write_u32(to, film.nodes().count() as u32)?;
@@ -204,6 +205,7 @@ fn read_film(from: &mut Source<impl Read>) -> io::Result<Film> {
 }
 
 fn read_allotment(from: &mut Source<impl Read>, pixels: u64) -> io::Result<Allotment> {
+    let pilot = u64::from_le_bytes(from.array()?);
     let count = u64::from(from.u32()?);
     if count != 0 && count != pixels {
         return Err(bad("exponents of another window"));
@@ -213,7 +215,7 @@ fn read_allotment(from: &mut Source<impl Read>, pixels: u64) -> io::Result<Allot
     if exponents.iter().any(|&e| e > Allotment::MOST) {
         return Err(bad("impossible exponents"));
     }
-    Ok(Allotment::from_exponents(exponents))
+    Ok(Allotment::from_exponents(exponents).with_pilot(pilot))
 }
 
 fn bad(what: &str) -> io::Error {

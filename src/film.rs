@@ -225,7 +225,7 @@ impl Film {
             .map(|(&first, node)| (first, node.level, &node.values[..]))
     }
 
-    /// Adds the samples first … first + 2^level − 1. `values` holds, for each pixel
+    /// Adds the samples first … first + 2^level − 1, those of a pixel with exponent e times 2^e. `values` holds, for each pixel
     /// of the window row by row, the sum of radiance (3), the sum of squared
     /// deviations from the node's own mean (3; of samples up to a single block, of
     /// blocks beyond, each counted once for each of its samples), what the samples of the first net add up to less those of

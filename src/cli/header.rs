@@ -16,6 +16,9 @@ use super::rerender::Repeat;
 /// The name of the limit that ended a render.
 pub const STOP: &str = "ledger.stop";
 
+/// Samples of the pilot that spread those of the picture.
+pub const PILOT: &str = "pilot";
+
 /// Which limit ended a render.
 #[derive(Clone, Copy, PartialEq)]
 pub enum Stop {
@@ -73,6 +76,9 @@ impl Record<'_> {
         put("features", features.join(" ").into());
         put("samples", ranges(&self.film.ranges()).into());
         put("spp", count(self.film.mean_of(self.film.samples())));
+        if self.job.settings.adaptive {
+            put(PILOT, count(self.film.allotment().pilot()));
+        }
         put("times.load", self.job.load.into());
         put("times.build", self.report.times.build.into());
         put("times.compile", self.report.times.compile.into());

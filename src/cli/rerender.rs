@@ -9,7 +9,7 @@ use etendue::{Error, Result};
 
 use super::args::{Arguments, Command, RenderArgs, RerenderArgs};
 use super::failure::{Failure, Outcome};
-use super::header::{Job, Record};
+use super::header::{Job, PILOT, Record};
 use super::identity::{DEVICE, JOB, check, number, show, text};
 use super::progress::Reporter;
 use super::{numbers, render};
@@ -106,6 +106,11 @@ impl Repeat {
                 what: format!("its header cannot be carried out: {error}"),
             }),
         }
+    }
+
+    /// Samples of the pilot that spread those of the picture.
+    pub fn pilot(&self) -> u64 {
+        number(&self.header, PILOT).unwrap_or(0.0) as u64
     }
 
     /// Refuses a scene that is not the one of the header any more.

@@ -78,27 +78,23 @@ impl<'a> Planner<'a> {
     fn spread(mut self, film: Film, budget: Budget, reporter: &Reporter) -> Result<Planned> {
         let end = self.job.settings.samples.end;
         let least = 0..budget.least;
-        let planned = match self.job.repeats {
-            Some(repeat) => repeat.samples.clone(),
-            None => vec![least],
+        let (planned, pilot) = match self.job.repeats {
+            Some(repeat) => (repeat.samples.clone(), repeat.pilot()),
+            None => (vec![least], budget.pilot),
         };
         if film.samples() > 0 {
             self.renderer.allot(film.allotment())?;
             return Ok((film, planned));
         }
-        self.renderer.restart(0..budget.pilot, self.settings.seed)?;
-        self.extend(0..budget.pilot)?;
+        self.renderer.restart(0..end, self.settings.seed)?;
+        self.extend(0..pilot)?;
         self.go_back()?;
-        if self.film.samples() < budget.pilot {
-            reporter.note("no time for a pilot: all pixels take as many samples");
-            return Ok((film, self.job.samples()));
-        }
         let allotment = Allotment::of(&self.film, end, budget);
         let film = film.with_allotment(allotment);
         self.renderer.allot(film.allotment())?;
         reporter.note(&format!(
             "samples are spread as {} others say: {} to {} a pixel",
-            budget.pilot,
+            self.film.samples(),
             budget.least,
             budget.least << film.allotment().most()
         ));

@@ -8,7 +8,8 @@ impl Renderer {
     /// Gives each pixel of the window its number of samples from here on; an empty allotment gives all the same.
     ///
     /// # Errors
-    /// [`Error::Settings`] where the settings do not say [`crate::settings::Settings::adaptive`] or it is one of another window; or the device fails.
+    /// [`Error::Settings`] where the settings do not say [`crate::settings::Settings::adaptive`] it is one of another window, or
+    /// an exponent is above [`Allotment::MOST`]; or the device fails.
     pub fn allot(&mut self, allotment: &Allotment) -> Result<()> {
         let pixels = self.empty_film().pixels();
         let given = allotment.exponents();
@@ -21,6 +22,9 @@ impl Renderer {
         }
         if !given.is_empty() && given.len() != pixels {
             return fail(format!("{} numbers for {pixels} pixels", given.len()));
+        }
+        if allotment.most() > u32::from(Allotment::MOST) {
+            return fail(format!("2^{} samples at once", allotment.most()));
         }
         let exponents: Vec<u32> = (0..pixels).map(|p| allotment.exponent(p)).collect();
         self.backend.set_allotment(&exponents)?;

@@ -292,6 +292,8 @@ fn samples_are_spread_only_where_they_can_be() {
     assert!(refused(
         renderer.allot(&Allotment::from_exponents(vec![1; 3]))
     ));
+    let all = vec![Allotment::MOST + 1; (SIDE * SIDE) as usize];
+    assert!(refused(renderer.allot(&Allotment::from_exponents(all))));
     // too few to be spread
     assert_eq!(renderer.spread(63).unwrap(), 63);
     assert_eq!(renderer.spread(64).unwrap(), 16);

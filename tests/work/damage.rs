@@ -20,7 +20,7 @@ fn film() -> Film {
         x1: 4,
         y1: 2,
     };
-    let allotment = Allotment::from_exponents(vec![0, 4, 1, 2, 3, 0]);
+    let allotment = Allotment::from_exponents(vec![0, 4, 1, 2, 3, 0]).with_pilot(16);
     let mut film = Film::new(window, (5, 3), false).with_allotment(allotment);
     for (first, level) in [(1, 0), (4, 2), (32, 5)] {
         let values = (0..54).map(|i| (hash(first + i) % 1000) as f32).collect();
