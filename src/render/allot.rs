@@ -8,7 +8,7 @@ impl Renderer {
     /// Gives each pixel of the window its number of samples from here on; an empty allotment gives all the same.
     ///
     /// # Errors
-    /// [`Error::Settings`] where the settings do not say [`crate::settings::Settings::adaptive`] it is one of another window, or
+    /// [`Error::Settings`] where the settings do not say [`crate::settings::Settings::adaptive`], it is one of another window, or
     /// an exponent is above [`Allotment::MOST`]; or the device fails.
     pub fn allot(&mut self, allotment: &Allotment) -> Result<()> {
         let pixels = self.empty_film().pixels();
