@@ -1,5 +1,6 @@
 //! `--checkpoint` and `--resume`.
 
+use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
@@ -57,7 +58,8 @@ impl Saved {
             let what = "only one of them has layers of the first hit";
             return mismatch("settings.aov", String::from(what));
         }
-        let asked = &job.settings.samples;
+        let Range { start, end } = job.settings.samples;
+        let asked = start..self.film.allotment().least(end);
         for held in self.film.ranges() {
             if held.start < asked.start || held.end > asked.end {
                 let what = format!(

@@ -326,7 +326,7 @@ fn rescue(error: Error, renderer: &mut Team, job: &Job, reporter: &Reporter) -> 
     match checkpoint::save(path, &record) {
         Ok(()) => reporter.warn(&format!(
             "the render failed; its {} finished samples are in {}, --resume goes on from there",
-            film.samples(),
+            film.mean_of(film.samples()),
             path.display()
         )),
         Err(failed) => reporter.warn(&failed.to_string()),

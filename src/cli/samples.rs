@@ -47,6 +47,12 @@ impl<'a> Planner<'a> {
         let Range { start, end } = self.job.settings.samples;
         let all = self.job.samples();
         if self.job.settings.adaptive {
+            if film.samples() > 0 {
+                // goes on as it was spread, or evenly where there were too few to spread
+                self.renderer.allot(film.allotment())?;
+                let planned = 0..film.allotment().least(end);
+                return Ok((film, vec![planned]));
+            }
             let Some(budget) = Budget::of(end) else {
                 reporter.note("too few samples to spread: all pixels take as many");
                 return Ok((film, all));
@@ -74,7 +80,7 @@ impl<'a> Planner<'a> {
         Ok((film, vec![planned]))
     }
 
-    /// Spreads the samples over the pixels.
+    /// Spreads the samples of a film that has none yet over the pixels.
     fn spread(mut self, film: Film, budget: Budget, reporter: &Reporter) -> Result<Planned> {
         let end = self.job.settings.samples.end;
         let least = 0..budget.least;
@@ -82,10 +88,6 @@ impl<'a> Planner<'a> {
             Some(repeat) => (repeat.samples.clone(), repeat.pilot()),
             None => (vec![least], budget.pilot),
         };
-        if film.samples() > 0 {
-            self.renderer.allot(film.allotment())?;
-            return Ok((film, planned));
-        }
         self.renderer.restart(0..end, self.settings.seed)?;
         self.extend(0..pilot)?;
         self.go_back()?;

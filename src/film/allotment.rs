@@ -142,6 +142,14 @@ impl Allotment {
         }
     }
 
+    /// Samples that the film counts where pixels are to take so many on average: as in [`Budget::of`].
+    pub fn least(&self, samples: u64) -> u64 {
+        match self.exponents.is_empty() {
+            true => samples,
+            false => samples / LEAST,
+        }
+    }
+
     /// Samples of the pilot that it was made by; 0 where there was none.
     pub fn pilot(&self) -> u64 {
         self.pilot

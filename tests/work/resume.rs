@@ -259,6 +259,21 @@ fn spread_samples_go_on_as_they_were_spread() {
     assert!(taken.iter().all(|n| (bounds[0]..=bounds[1]).contains(n)));
     assert!(taken.iter().any(|n| *n != taken[0]));
 
+    // fewer than are there are refused, as they are where samples are even
+    for fewer in [40, 100] {
+        let line = format!("render scene.gltf {saved} --spp {fewer}");
+        let output = etendue(&line, folder.path());
+        assert!(!output.status.success(), "{fewer}");
+        let expected = format!("0..48 there, 0..{} here", fewer / 4);
+        assert!(stderr(&output).contains(&expected), "{}", stderr(&output));
+    }
+    // what began with too few to spread stays even, and takes all
+    let late = saved.replace("c.ck", "late.ck");
+    render(&folder, &format!("{late} --spp 40"));
+    render(&folder, &format!("{late} --spp 80"));
+    let taken = read(&folder, "a.exr");
+    assert!(taken.channel("samples").unwrap().iter().all(|n| *n == 80.0));
+
     let even = saved.replace("--adaptive", "");
     let output = etendue(
         &format!("render scene.gltf {even} --spp 192"),
