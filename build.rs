@@ -6,7 +6,7 @@ mod shaders;
 use std::path::{Path, PathBuf};
 use std::{env, fs};
 
-use shaders::{SHADERS, compile};
+use shaders::{Entry, SHADERS, compile_all};
 
 fn main() {
     println!("cargo::rerun-if-changed=shaders");
@@ -24,18 +24,17 @@ fn main() {
     if fs::read_to_string(&stamp).is_ok_and(|old| old == shaders) {
         return;
     }
-    let compiler = shaderc::Compiler::new().expect("shaderc starts");
     let read =
         |name: &str| fs::read_to_string(Path::new("shaders").join(name)).map_err(|e| e.to_string());
-    for (source, macros, name) in SHADERS {
-        let level = shaderc::OptimizationLevel::Performance;
-        let spirv = compile(&compiler, &read, source, macros, level);
-        fs::write(out.join(format!("{name}.spv")), spirv).expect("OUT_DIR is writable");
-    }
+    compile_all(
+        SHADERS,
+        shaderc::OptimizationLevel::Performance,
+        &read,
+        &out,
+    );
     // Unoptimised: names survive for tests/layout.rs to read, whatever is unused.
-    let level = shaderc::OptimizationLevel::Zero;
-    let probe = compile(&compiler, &read, "tests/layout_probe.comp", &[], level);
-    fs::write(out.join("layout_probe.spv"), probe).expect("OUT_DIR is writable");
+    let probe: Entry = ("tests/layout_probe.comp", &[], "layout_probe");
+    compile_all(&[probe], shaderc::OptimizationLevel::Zero, &read, &out);
     fs::write(stamp, shaders).expect("OUT_DIR is writable");
 }
 

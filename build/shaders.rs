@@ -1,9 +1,15 @@
 //! The table of shaders and how one of them becomes SPIR-V: for build.rs, and for
 //! tests/mutants, which compiles changed ones.
 
-/// (source, macros, output). A macro chooses which traversal or kernel is included, or what
+use std::path::Path;
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+/// Source, macros, output.
+pub type Entry = (&'static str, &'static [&'static str], &'static str);
+
+/// A macro chooses which traversal or kernel is included, or what
 /// holds the arrays, and nothing else.
-pub const SHADERS: &[(&str, &[&str], &str)] = &[
+pub const SHADERS: &[Entry] = &[
     ("kernel.comp", &["TRAVERSE_SOFTWARE"], "path_software"),
     ("kernel.comp", &["TRAVERSE_QUERY"], "path_query"),
     // the same for scenes of opaque surfaces
@@ -37,6 +43,37 @@ pub const SHADERS: &[(&str, &[&str], &str)] = &[
         "kernel.comp",
         &["TRAVERSE_QUERY", "KERNEL_PROBE"],
         "probe_query",
+    ),
+    // for CPUs that gather
+    (
+        "kernel.comp",
+        &["TRAVERSE_SOFTWARE", "ADDRESSES"],
+        "path_software_addresses",
+    ),
+    (
+        "kernel.comp",
+        &["TRAVERSE_SOFTWARE", "ADDRESSES", "PLAIN"],
+        "path_software_addresses_plain",
+    ),
+    (
+        "kernel.comp",
+        &["TRAVERSE_QUERY", "ADDRESSES"],
+        "path_query_addresses",
+    ),
+    (
+        "kernel.comp",
+        &["TRAVERSE_QUERY", "ADDRESSES", "PLAIN"],
+        "path_query_addresses_plain",
+    ),
+    (
+        "kernel.comp",
+        &["TRAVERSE_SOFTWARE", "ADDRESSES", "TRACE_TWICE"],
+        "path_addresses_twice",
+    ),
+    (
+        "kernel.comp",
+        &["TRAVERSE_SOFTWARE", "ADDRESSES", "TRACE_COUNTS"],
+        "path_addresses_counts",
     ),
     // as path_software, with what wgpu lacks left out
     ("kernel.comp", &["TRAVERSE_SOFTWARE", "WGPU"], "path_wgpu"),
@@ -97,12 +134,36 @@ fn kind(source: &str) -> shaderc::ShaderKind {
     }
 }
 
+/// SPIR-V of entries of the table, into files `NAME.spv` of a folder: by as many threads as there are
+/// processors. `read` gives the text of a file below `shaders`.
+///
+/// # Panics
+///
+/// With the compiler's message, where a shader is wrong; where a file cannot be written.
+pub fn compile_all(
+    entries: &[Entry],
+    level: shaderc::OptimizationLevel,
+    read: &(dyn Fn(&str) -> Result<String, String> + Sync),
+    folder: &Path,
+) {
+    let next = AtomicUsize::new(0);
+    let work = || {
+        let compiler = shaderc::Compiler::new().expect("shaderc starts");
+        while let Some((source, macros, name)) = entries.get(next.fetch_add(1, Ordering::Relaxed)) {
+            let spirv = compile(&compiler, read, source, macros, level);
+            std::fs::write(folder.join(format!("{name}.spv")), spirv).expect("it is writable");
+        }
+    };
+    let threads = std::thread::available_parallelism().map_or(1, usize::from);
+    std::thread::scope(|scope| (0..threads).for_each(|_| drop(scope.spawn(work))));
+}
+
 /// SPIR-V of one entry of the table. `read` gives the text of a file below `shaders`.
 ///
 /// # Panics
 ///
 /// With the compiler's message, where the shader is wrong.
-pub fn compile(
+fn compile(
     compiler: &shaderc::Compiler,
     read: &dyn Fn(&str) -> Result<String, String>,
     source: &str,

@@ -1,11 +1,15 @@
 // Entry of every compute kernel. A macro chooses the traversal (traverse.glsl), the
-// kernel, or with WGPU what wgpu can bind and naga read, and nothing else.
+// kernel, what holds the scene's arrays (scene.glsl), and nothing else.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_KHR_shader_subgroup_arithmetic : require
 #extension GL_KHR_shader_subgroup_vote : require
 #ifdef TRAVERSE_SOFTWARE
 #extension GL_EXT_control_flow_attributes : require
+#endif
+#ifdef ADDRESSES
+#extension GL_EXT_buffer_reference : require
+#extension GL_EXT_shader_explicit_arithmetic_types_int64 : require
 #endif
 #ifdef TRAVERSE_QUERY
 #extension GL_EXT_ray_query : require

@@ -7,7 +7,9 @@
 
 layout(push_constant, scalar) uniform BatchBlock { Batch batch; };
 
-#ifndef WGPU
+#if defined(ADDRESSES)
+#define allotment(i) scene_single(BIND_ALLOTMENT, i)
+#elif !defined(WGPU)
 layout(binding = BIND_ALLOTMENT) uniform usamplerBuffer allotment;
 #endif
 

@@ -337,5 +337,7 @@ const uint BIND_PLANES = 19u;        // uniform buffer: Plane[PLANES_MAX] (own B
 const uint BIND_SMALL_NODES = 20u;   // uniform buffer: SMALL_TEXELS of BIND_BVH_NODES, with HAS_SMALL_NODES
 const uint BIND_SMALL_RECORDS = 21u; // uniform buffer: SMALL_TEXELS of BIND_BVH_TRIANGLES, with HAS_SMALL_RECORDS
 const uint BIND_ALLOTMENT = 22u;     // texel buffer R32UI: an exponent for each pixel of the window, with HAS_ALLOTMENT
+const uint BIND_ADDRESSES = 23u;     // uniform buffer: addresses of texel buffers by their bindings (ADDRESSES)
+const uint ADDRESSES_SIZE = 24u;
 
 #endif

@@ -9,7 +9,8 @@
 
 layout(binding = BIND_PARAMS, scalar) uniform ParamsBlock { Params params; };
 
-// wgpu has no texel buffers; the same records then are storage buffers.
+// wgpu has no texel buffers; the same records then are storage buffers. CPUs that gather read
+// by addresses, in words of 64 bits (docs/decisions.md).
 #ifdef WGPU
 #define texelFetch(array, i) array[i]
 layout(binding = BIND_INSTANCES, scalar) readonly buffer InstancesBlock { uvec4 instances[]; };
@@ -23,6 +24,31 @@ layout(binding = BIND_LIGHTS, scalar) readonly buffer LightsBlock { uvec4 lights
 layout(binding = BIND_ENV_MAP, scalar) readonly buffer EnvMapBlock { vec4 env_map[]; };
 layout(binding = BIND_ENV_TABLE, scalar) readonly buffer EnvTableBlock { uvec2 env_table[]; };
 layout(binding = BIND_MEDIA, scalar) readonly buffer MediaBlock { uvec4 media[]; };
+#elif defined(ADDRESSES)
+layout(binding = BIND_ADDRESSES, scalar) uniform AddressesBlock { uint64_t addresses[ADDRESSES_SIZE]; };
+layout(buffer_reference, scalar, buffer_reference_align = 16) readonly buffer Quad { u64vec2 words; };
+layout(buffer_reference, scalar, buffer_reference_align = 8) readonly buffer Pair { uint64_t words; };
+layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer Single { uint word; };
+uint64_t scene_address(uint binding, int i, uint bytes) { return addresses[binding] + uint64_t(uint(i)) * bytes; }
+uvec4 scene_quad(uint binding, int i)
+{
+    u64vec2 words = Quad(scene_address(binding, i, 16u)).words;
+    return uvec4(unpackUint2x32(words.x), unpackUint2x32(words.y));
+}
+uvec2 scene_pair(uint binding, int i) { return unpackUint2x32(Pair(scene_address(binding, i, 8u)).words); }
+uint scene_single(uint binding, int i) { return Single(scene_address(binding, i, 4u)).word; }
+#define texelFetch(array, i) array(i)
+#define instances(i) scene_quad(BIND_INSTANCES, i)
+#define triangles(i) scene_quad(BIND_TRIANGLES, i)
+#define vertices(i) uintBitsToFloat(scene_quad(BIND_VERTICES, i))
+#define attributes(i) uintBitsToFloat(scene_quad(BIND_ATTRIBUTES, i))
+#define materials(i) scene_quad(BIND_MATERIALS, i)
+#define texture_uses(i) scene_quad(BIND_TEXTURE_USES, i)
+#define texels(i) scene_single(BIND_TEXELS, i)
+#define lights(i) scene_quad(BIND_LIGHTS, i)
+#define env_map(i) uintBitsToFloat(scene_quad(BIND_ENV_MAP, i))
+#define env_table(i) scene_pair(BIND_ENV_TABLE, i)
+#define media(i) scene_quad(BIND_MEDIA, i)
 #else
 layout(binding = BIND_INSTANCES) uniform usamplerBuffer instances;
 layout(binding = BIND_TRIANGLES) uniform usamplerBuffer triangles;

@@ -18,6 +18,9 @@
 #ifdef WGPU
 layout(binding = BIND_BVH_NODES, scalar) readonly buffer BvhNodesBlock { uvec4 bvh_nodes[]; };
 layout(binding = BIND_BVH_TRIANGLES, scalar) readonly buffer BvhTrianglesBlock { uvec4 bvh_triangles[]; };
+#elif defined(ADDRESSES)
+#define bvh_nodes(i) scene_quad(BIND_BVH_NODES, i)
+#define bvh_triangles(i) scene_quad(BIND_BVH_TRIANGLES, i)
 #else
 layout(binding = BIND_BVH_NODES) uniform usamplerBuffer bvh_nodes;
 layout(binding = BIND_BVH_TRIANGLES) uniform usamplerBuffer bvh_triangles;
@@ -41,9 +44,9 @@ const uint BVH_SECOND_TURN = 4u;
 const uint BVH_FLAT = 64u;
 const uint BVH_NODE_RECORDS = 24u; // of a node at most
 
-#ifdef WGPU
-uvec4 bvh_node_texel(uint index) { return bvh_nodes[index]; }
-uvec4 bvh_triangle_texel(uint index) { return bvh_triangles[index]; }
+#if defined(WGPU) || defined(ADDRESSES)
+uvec4 bvh_node_texel(uint index) { return texelFetch(bvh_nodes, int(index)); }
+uvec4 bvh_triangle_texel(uint index) { return texelFetch(bvh_triangles, int(index)); }
 #else
 uvec4 bvh_node_texel(uint index) {
     if (HAS_SMALL_NODES) return bvh_small_nodes[index];
@@ -83,20 +86,16 @@ vec4 bvh_planes(uint word, float scale, float offset) { return vec4(bvh_bytes(wo
 // Bits of four children that the ray may meet.
 uint bvh_four_hits(uvec3 near_words, uvec3 far_words, vec3 scale, vec3 near_offset, vec3 far_offset,
                    float t_min, float t_max, uint meta, uint octant) {
-    // Comparisons instead of min and max, which take three instructions each on
-    // lavapipe for the sake of NaN; `precise` keeps them. Nothing here is NaN.
-    precise vec4 nx = bvh_planes(near_words.x, scale.x, near_offset.x);
-    precise vec4 ny = bvh_planes(near_words.y, scale.y, near_offset.y);
-    precise vec4 nz = bvh_planes(near_words.z, scale.z, near_offset.z);
-    precise vec4 fx = bvh_planes(far_words.x, scale.x, far_offset.x);
-    precise vec4 fy = bvh_planes(far_words.y, scale.y, far_offset.y);
-    precise vec4 fz = bvh_planes(far_words.z, scale.z, far_offset.z);
-    precise vec4 near = mix(ny, nx, greaterThan(nx, ny));
-    near = mix(near, nz, greaterThan(nz, near));
-    near = mix(near, vec4(t_min), lessThan(near, vec4(t_min)));
-    precise vec4 far = mix(fy, fx, lessThan(fx, fy));
-    far = mix(far, fz, lessThan(fz, far));
-    far = mix(far, vec4(t_max), greaterThan(far, vec4(t_max)));
+    // Compared as integers: min and max of floats take three instructions each on lavapipe for the sake of NaN.
+    // Bits of floats that are not negative are in the same order, and t_min is not, so a negative distance is below it.
+    precise ivec4 nx = floatBitsToInt(bvh_planes(near_words.x, scale.x, near_offset.x));
+    precise ivec4 ny = floatBitsToInt(bvh_planes(near_words.y, scale.y, near_offset.y));
+    precise ivec4 nz = floatBitsToInt(bvh_planes(near_words.z, scale.z, near_offset.z));
+    precise ivec4 fx = floatBitsToInt(bvh_planes(far_words.x, scale.x, far_offset.x));
+    precise ivec4 fy = floatBitsToInt(bvh_planes(far_words.y, scale.y, far_offset.y));
+    precise ivec4 fz = floatBitsToInt(bvh_planes(far_words.z, scale.z, far_offset.z));
+    ivec4 near = max(max(nx, ny), max(nz, ivec4(floatBitsToInt(t_min))));
+    ivec4 far = min(min(fx, fy), min(fz, ivec4(floatBitsToInt(t_max))));
     // Low five bits of a slot's byte: 24 + slot for a node, offset of the record for a leaf. Upper three: 001 for
     // a node, number of records in unary for a leaf.
     uint is_node = ((meta & (meta << 1)) & 0x10101010u) >> 4;

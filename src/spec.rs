@@ -290,23 +290,35 @@ macro_rules! kernel {
 pub(crate) mod kernels {
     use super::Kernel;
 
-    pub(crate) const PATH_SOFTWARE: Kernel = kernel!("path_software");
-    pub(crate) const PATH_QUERY: Kernel = kernel!("path_query");
-    /// The same without [`super::NOT_PLAIN`].
-    pub(crate) const PATH_SOFTWARE_PLAIN: Kernel = kernel!("path_software_plain");
-    pub(crate) const PATH_QUERY_PLAIN: Kernel = kernel!("path_query_plain");
-    /// As `PATH_SOFTWARE`, but every ray is traced twice: the same image.
-    pub(crate) const PATH_TWICE: Kernel = kernel!("path_twice");
-    /// As `PATH_SOFTWARE`, and counts what traversal does.
-    pub(crate) const PATH_COUNTS: Kernel = kernel!("path_counts");
+    /// By texel buffers and by addresses; with everything and without [`super::NOT_PLAIN`].
+    pub(crate) const PATH_SOFTWARE: [[Kernel; 2]; 2] = [
+        [kernel!("path_software"), kernel!("path_software_plain")],
+        [
+            kernel!("path_software_addresses"),
+            kernel!("path_software_addresses_plain"),
+        ],
+    ];
+    pub(crate) const PATH_QUERY: [[Kernel; 2]; 2] = [
+        [kernel!("path_query"), kernel!("path_query_plain")],
+        [
+            kernel!("path_query_addresses"),
+            kernel!("path_query_addresses_plain"),
+        ],
+    ];
+    /// As `PATH_SOFTWARE` with everything, but every ray is traced twice: the same image.
+    pub(crate) const PATH_TWICE: [Kernel; 2] =
+        [kernel!("path_twice"), kernel!("path_addresses_twice")];
+    /// The same, and counts what traversal does.
+    pub(crate) const PATH_COUNTS: [Kernel; 2] =
+        [kernel!("path_counts"), kernel!("path_addresses_counts")];
     pub(crate) const PROBE_SOFTWARE: Kernel = kernel!("probe_software");
     pub(crate) const PROBE_QUERY: Kernel = kernel!("probe_query");
     #[cfg(feature = "wgpu")]
     pub(crate) const PATH_WGPU: Kernel = kernel!("path_wgpu");
     #[cfg(feature = "wgpu")]
     pub(crate) const PATH_WGPU_QUERY: Kernel = kernel!("path_wgpu_query");
-    pub(crate) const PATH_PIPELINE: Kernel = kernel!("path_pipeline");
-    pub(crate) const PATH_PIPELINE_PLAIN: Kernel = kernel!("path_pipeline_plain");
+    pub(crate) const PATH_PIPELINE: [Kernel; 2] =
+        [kernel!("path_pipeline"), kernel!("path_pipeline_plain")];
     pub(crate) const PROBE_PIPELINE: Kernel = kernel!("probe_pipeline");
     /// What the ray generation shaders call.
     pub(crate) const TRACE_MISS: Kernel = kernel!("trace_miss");

@@ -6,10 +6,11 @@ use std::sync::Arc;
 use ash::vk;
 use bytemuck::{Pod, Zeroable};
 
-use super::buffer::{Buffer, Memory, Usage};
+use super::buffer::{Buffer, Memory};
 use super::commands::Commands;
 use super::device::Device;
 use super::failed;
+use super::usage::Usage;
 use crate::error::{Error, Result};
 
 /// Custom indices of instances have 24 bits.

@@ -1,7 +1,6 @@
 //! Buffers: memory that shaders see. A [`Buffer`] is a cheap handle; the memory
 //! is freed with the last one.
 
-use std::ops::BitOr;
 use std::sync::Arc;
 
 use ash::vk;
@@ -11,6 +10,7 @@ use gpu_allocator::{AllocationError, MemoryLocation};
 
 use super::device::Device;
 use super::failed;
+use super::usage::Usage;
 use crate::error::{Error, Result};
 
 /// Copies between host and device-local memory go through a staging buffer of at
@@ -31,106 +31,6 @@ pub enum Memory {
     Upload,
     /// Written by the GPU, read by the host.
     Readback,
-}
-
-/// Format of the elements of a texel buffer.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum TexelFormat {
-    /// Four 32-bit unsigned integers.
-    Rgba32Uint,
-    /// Four 32-bit floats.
-    Rgba32Float,
-    /// Two 32-bit unsigned integers.
-    Rg32Uint,
-    /// One 32-bit unsigned integer.
-    R32Uint,
-}
-
-impl TexelFormat {
-    /// Bytes of one element.
-    pub fn bytes(self) -> u64 {
-        match self {
-            Self::Rgba32Uint | Self::Rgba32Float => 16,
-            Self::Rg32Uint => 8,
-            Self::R32Uint => 4,
-        }
-    }
-
-    fn vulkan(self) -> vk::Format {
-        match self {
-            Self::Rgba32Uint => vk::Format::R32G32B32A32_UINT,
-            Self::Rgba32Float => vk::Format::R32G32B32A32_SFLOAT,
-            Self::Rg32Uint => vk::Format::R32G32_UINT,
-            Self::R32Uint => vk::Format::R32_UINT,
-        }
-    }
-}
-
-/// What a buffer is for; join several with `|`. Copies and fills are always allowed.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Usage {
-    flags: vk::BufferUsageFlags,
-    texel: Option<TexelFormat>,
-}
-
-impl Usage {
-    /// Copies only.
-    pub const TRANSFER: Self = Self::of(vk::BufferUsageFlags::empty());
-    /// A storage buffer of a shader.
-    pub const STORAGE: Self = Self::of(vk::BufferUsageFlags::STORAGE_BUFFER);
-    /// A uniform buffer of a shader.
-    pub const UNIFORM: Self = Self::of(vk::BufferUsageFlags::UNIFORM_BUFFER);
-    /// Vertices, indices or instances from which acceleration structures are built.
-    pub const ACCELERATION_INPUT: Self = Self::of(vk::BufferUsageFlags::from_raw(
-        vk::BufferUsageFlags::ACCELERATION_STRUCTURE_BUILD_INPUT_READ_ONLY_KHR.as_raw()
-            | vk::BufferUsageFlags::SHADER_DEVICE_ADDRESS.as_raw(),
-    ));
-    /// Holds an acceleration structure.
-    pub const ACCELERATION_STORAGE: Self = Self::of(vk::BufferUsageFlags::from_raw(
-        vk::BufferUsageFlags::ACCELERATION_STRUCTURE_STORAGE_KHR.as_raw()
-            | vk::BufferUsageFlags::SHADER_DEVICE_ADDRESS.as_raw(),
-    ));
-    /// Working memory of a build.
-    pub const SCRATCH: Self = Self::of(vk::BufferUsageFlags::from_raw(
-        vk::BufferUsageFlags::STORAGE_BUFFER.as_raw()
-            | vk::BufferUsageFlags::SHADER_DEVICE_ADDRESS.as_raw(),
-    ));
-    /// Handles of the shaders that rays call.
-    pub const SHADER_TABLE: Self = Self::of(vk::BufferUsageFlags::from_raw(
-        vk::BufferUsageFlags::SHADER_BINDING_TABLE_KHR.as_raw()
-            | vk::BufferUsageFlags::SHADER_DEVICE_ADDRESS.as_raw(),
-    ));
-
-    const fn of(flags: vk::BufferUsageFlags) -> Self {
-        Self { flags, texel: None }
-    }
-
-    /// A uniform texel buffer of a shader. One buffer has one format.
-    pub const fn texel(format: TexelFormat) -> Self {
-        Self {
-            flags: vk::BufferUsageFlags::UNIFORM_TEXEL_BUFFER,
-            texel: Some(format),
-        }
-    }
-
-    pub(super) fn allows(self, flags: vk::BufferUsageFlags) -> bool {
-        self.flags.contains(flags)
-    }
-}
-
-impl BitOr for Usage {
-    type Output = Self;
-
-    fn bitor(self, other: Self) -> Self {
-        assert!(
-            self.texel.is_none() || other.texel.is_none() || self.texel == other.texel,
-            "a buffer has one texel format"
-        );
-        Self {
-            flags: self.flags | other.flags,
-            texel: self.texel.or(other.texel),
-        }
-    }
 }
 
 /// Memory on a device; clones share it.
@@ -176,9 +76,13 @@ impl Buffer {
         memory: Memory,
     ) -> Result<Self> {
         let limit = limit(device, usage);
-        let needs_rays = usage.allows(vk::BufferUsageFlags::SHADER_DEVICE_ADDRESS)
-            || usage.allows(vk::BufferUsageFlags::ACCELERATION_STRUCTURE_STORAGE_KHR);
-        if needs_rays {
+        let is_of_rays = usage.flags.intersects(
+            vk::BufferUsageFlags::ACCELERATION_STRUCTURE_BUILD_INPUT_READ_ONLY_KHR
+                | vk::BufferUsageFlags::ACCELERATION_STRUCTURE_STORAGE_KHR
+                | vk::BufferUsageFlags::SHADER_BINDING_TABLE_KHR,
+        );
+        let has_address = usage.allows(vk::BufferUsageFlags::SHADER_DEVICE_ADDRESS);
+        if is_of_rays || has_address && !device.caps().addresses {
             device.acceleration()?;
         }
         // Rounded without overflow: what does not fit 64 bits exceeds every limit.
@@ -321,6 +225,13 @@ impl Buffer {
 
     pub(super) fn is_of(&self, device: &Arc<Device>) -> bool {
         Arc::ptr_eq(&self.0.device, device)
+    }
+
+    /// Where shaders find the buffer, if its usage has addresses.
+    pub fn shader_address(&self) -> Option<u64> {
+        let usage = self.0.usage;
+        let has_address = usage.allows(vk::BufferUsageFlags::SHADER_DEVICE_ADDRESS);
+        has_address.then(|| self.address())
     }
 
     /// Where shaders and builds find the buffer; only with a usage that has addresses.

@@ -56,6 +56,8 @@ pub struct Caps {
     pub ray_pipeline: Result<(), String>,
     /// Whether rays are probably traced by circuits: ray query on a device that is no CPU.
     pub ray_hardware_likely: bool,
+    /// Whether shaders can read buffers by addresses of 64 bits.
+    pub addresses: bool,
     /// Largest storage buffer a shader can see, bytes.
     pub max_storage_range: u64,
     /// Largest uniform buffer a shader can see, bytes.
@@ -111,6 +113,7 @@ struct Modern {
     subgroup_size: u32,
     max_buffer_bytes: u64,
     maintenance4: bool,
+    addresses: bool,
     memory_budget: bool,
     scalar_block_layout: bool,
     /// Arithmetic and votes in compute shaders.
@@ -197,6 +200,7 @@ impl Caps {
             scratch_alignment: modern.scratch_alignment,
             ray_pipeline_limits: modern.ray_pipeline_limits,
             maintenance4: modern.maintenance4,
+            addresses: modern.addresses,
             memory_budget: modern.memory_budget,
         })
     }
@@ -292,6 +296,7 @@ fn query_modern(instance: &Instance, physical: vk::PhysicalDevice, version: u32)
     }
 
     let is_on = |feature: vk::Bool32| feature == vk::TRUE;
+    let addresses = is_on(features.features.shader_int64) && is_on(f12.buffer_device_address);
     let mut missing = Vec::new();
     for name in BUILD_EXTENSIONS.into_iter().filter(|&name| !has(name)) {
         missing.push(name.to_str().expect("extension names are ASCII"));
@@ -328,6 +333,7 @@ fn query_modern(instance: &Instance, physical: vk::PhysicalDevice, version: u32)
         subgroup_size: v11.subgroup_size,
         max_buffer_bytes,
         maintenance4: is_on(f13.maintenance4),
+        addresses,
         memory_budget: has(ext::memory_budget::NAME),
         scalar_block_layout: is_on(f12.scalar_block_layout),
         subgroup_operations: v11

@@ -107,7 +107,7 @@ impl Device {
             device: raw.clone(),
             physical_device: physical,
             debug_settings: AllocatorDebugSettings::default(),
-            buffer_device_address: request.needs_acceleration(),
+            buffer_device_address: caps.addresses || request.needs_acceleration(),
             allocation_sizes: AllocationSizes::new(DEVICE_BLOCK_BYTES, HOST_BLOCK_BYTES),
         })
         .map_err(|error| Error::Unsupported {
@@ -334,7 +334,8 @@ fn create(
     }
     let mut f12 = vk::PhysicalDeviceVulkan12Features::default()
         .scalar_block_layout(true)
-        .buffer_device_address(request.needs_acceleration());
+        .buffer_device_address(caps.addresses || request.needs_acceleration());
+    let f10 = vk::PhysicalDeviceFeatures::default().shader_int64(caps.addresses);
     let mut f13 = vk::PhysicalDeviceVulkan13Features::default().maintenance4(true);
     let mut f_build =
         vk::PhysicalDeviceAccelerationStructureFeaturesKHR::default().acceleration_structure(true);
@@ -343,6 +344,7 @@ fn create(
         vk::PhysicalDeviceRayTracingPipelineFeaturesKHR::default().ray_tracing_pipeline(true);
     let mut info = vk::DeviceCreateInfo::default()
         .queue_create_infos(&queues)
+        .enabled_features(&f10)
         .push_next(&mut f12);
     if caps.maintenance4 {
         info = info.push_next(&mut f13);

@@ -37,15 +37,17 @@ mod rays;
 #[cfg(feature = "faults")]
 #[doc(hidden)]
 pub mod shim;
+mod usage;
 
 pub use accel::{Blas, BlasGeometry, Tlas, TlasInstance};
-pub use buffer::{Buffer, Memory, TexelFormat, Usage};
+pub use buffer::{Buffer, Memory};
 pub use caps::{Caps, DeviceKind};
 pub use commands::{Commands, GpuTime};
 pub use device::{Device, DeviceRequest, enumerate};
 pub use instance::ValidationLog;
 pub use pipeline::{BindSet, BindingKind, Pipeline, PipelineDesc, Resource};
 pub use rays::RayStages;
+pub use usage::{TexelFormat, Usage};
 
 /// Turns Vulkan's code into the library's error; `op` says what was attempted.
 fn failed(op: impl Into<String>) -> impl FnOnce(ash::vk::Result) -> crate::Error {

@@ -5,12 +5,13 @@ use std::sync::Arc;
 
 use ash::vk;
 
-use super::buffer::{Buffer, Memory, Usage};
+use super::buffer::{Buffer, Memory};
 use super::commands::Commands;
 use super::device::Device;
 use super::failed;
 use super::kept::Recipe;
 use super::pipeline::{BindSet, Constants, Module, Pipeline, PipelineDesc, PipelineInner};
+use super::usage::Usage;
 use crate::error::{Error, Result};
 
 /// The modules that a ray generation shader calls; the entry point of each is `main`.

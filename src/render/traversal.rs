@@ -171,6 +171,17 @@ impl Traversal {
         }
     }
 
+    /// Its texel buffers.
+    pub fn texel_buffers(&self) -> Vec<(u32, &Buffer)> {
+        match self {
+            Self::Software { nodes, records, .. } => vec![
+                (layout::BIND_BVH_NODES, nodes),
+                (layout::BIND_BVH_TRIANGLES, records),
+            ],
+            Self::Query { .. } | Self::Pipeline { .. } => Vec::new(),
+        }
+    }
+
     /// Compiles the kernel that renders; only that with the own tree can be another for the limit report.
     pub fn path_pipeline(
         &self,
@@ -178,19 +189,17 @@ impl Traversal {
         spec: &Spec,
         bindings: &[(u32, BindingKind)],
         study: Study,
+        by_address: bool,
     ) -> Result<Pipeline> {
-        let is_plain = spec.is_plain();
+        let (address, plain) = (usize::from(by_address), usize::from(spec.is_plain()));
         let kernel = match self {
             Self::Software { .. } => match study {
-                Study::None if is_plain => kernels::PATH_SOFTWARE_PLAIN,
-                Study::None => kernels::PATH_SOFTWARE,
-                Study::Twice => kernels::PATH_TWICE,
-                Study::Counts => kernels::PATH_COUNTS,
+                Study::None => kernels::PATH_SOFTWARE[address][plain],
+                Study::Twice => kernels::PATH_TWICE[address],
+                Study::Counts => kernels::PATH_COUNTS[address],
             },
-            Self::Query { .. } if is_plain => kernels::PATH_QUERY_PLAIN,
-            Self::Query { .. } => kernels::PATH_QUERY,
-            Self::Pipeline { .. } if is_plain => kernels::PATH_PIPELINE_PLAIN,
-            Self::Pipeline { .. } => kernels::PATH_PIPELINE,
+            Self::Query { .. } => kernels::PATH_QUERY[address][plain],
+            Self::Pipeline { .. } => kernels::PATH_PIPELINE[plain],
         };
         self.pipeline(device, "path", kernel, spec, bindings)
     }
@@ -281,18 +290,19 @@ impl Traversal {
     }
 }
 
-/// The tree on the device, and what is tested before it.
+/// The tree on the device in texel buffers that are used in other ways as well, and what is tested before it.
 pub(super) fn upload_bvh(
     device: &Arc<Device>,
     bvh: &Bvh,
     planes: &[layout::Plane],
     spec: &Spec,
+    usage: Usage,
 ) -> Result<Traversal> {
     let mut all = [layout::Plane::default(); layout::PLANES_MAX as usize];
     all[..planes.len()].copy_from_slice(planes);
     Ok(Traversal::Software {
-        nodes: texel(device, "bvh nodes", RECORDS, &bvh.nodes, false)?,
-        records: texel(device, "bvh triangles", RECORDS, &bvh.triangles, false)?,
+        nodes: texel(device, "bvh nodes", RECORDS, &bvh.nodes, usage)?,
+        records: texel(device, "bvh triangles", RECORDS, &bvh.triangles, usage)?,
         planes: Buffer::from_slice(device, "planes", Usage::UNIFORM, &all)?,
         small_nodes: small(device, "small nodes", &bvh.nodes, spec.small_nodes)?,
         small_records: small(device, "small records", &bvh.triangles, spec.small_records)?,

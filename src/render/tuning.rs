@@ -20,6 +20,8 @@ pub struct Tuning {
     pub planes: Option<bool>,
     /// Whether a small tree of our own lies in uniform buffers; `None`: on CPUs, which read them faster.
     pub small: Option<bool>,
+    /// Whether kernels read the scene's arrays by their addresses, where the device can; `None`: on CPUs that gather.
+    pub addresses: Option<bool>,
     /// Whether the device's own structures hold boxes, and shaders test the triangles in them; `None`: on CPUs, whose
     /// own test has gaps at edges.
     pub boxes: Option<bool>,
@@ -65,6 +67,7 @@ impl Default for Tuning {
             device_bytes: None,
             planes: None,
             small: None,
+            addresses: None,
             boxes: None,
             study: Study::None,
         }

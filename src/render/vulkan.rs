@@ -94,13 +94,23 @@ impl VulkanBackend {
         let film_bytes = film_bytes(device.caps().max_storage_range, &params, data.spec.aovs);
         let mut memory = room::estimate(data, bvh.as_ref(), film_bytes);
         room::check(device, &memory, tuning.device_bytes)?;
+        let by_address = choice != BackendChoice::RayPipeline
+            && device.caps().addresses
+            && tuning.addresses.unwrap_or(is_cpu && can_gather());
+        let usage = match by_address {
+            true => Usage::ADDRESS,
+            false => Usage::default(),
+        };
         let mut instances = data.instances.clone();
         let vertices = texel(
             device,
             "vertices",
             TexelFormat::Rgba32Float,
             &data.geometry.vertices,
-            choice != BackendChoice::Bvh,
+            match choice {
+                BackendChoice::Bvh => usage,
+                _ => usage | Usage::ACCELERATION_INPUT,
+            },
         )?;
         let traversal = match bvh {
             Some(bvh) => {
@@ -112,11 +122,11 @@ impl VulkanBackend {
                 if let Some(planes) = &planes {
                     planes.note(&mut spec, &mut params);
                 }
-                if tuning.small.unwrap_or(is_cpu) {
+                if tuning.small.unwrap_or(is_cpu) && !by_address {
                     note_small(&bvh, &mut spec);
                 }
                 let list = planes.as_ref().map_or(&[][..], |planes| &planes.list);
-                upload_bvh(device, &bvh, list, &spec)?
+                upload_bvh(device, &bvh, list, &spec, usage)?
             }
             None => {
                 spec.boxes = tuning.boxes.unwrap_or(is_cpu);
@@ -128,7 +138,7 @@ impl VulkanBackend {
             }
         };
         let storage = BindingKind::Storage;
-        let shared = vec![
+        let mut shared = vec![
             (
                 layout::BIND_PARAMS,
                 BindingKind::Uniform,
@@ -137,7 +147,7 @@ impl VulkanBackend {
             (
                 layout::BIND_INSTANCES,
                 BindingKind::Texel,
-                texel(device, "instances", RECORDS, &instances, false)?,
+                texel(device, "instances", RECORDS, &instances, usage)?,
             ),
             (
                 layout::BIND_TRIANGLES,
@@ -147,7 +157,7 @@ impl VulkanBackend {
                     "triangles",
                     TexelFormat::Rgba32Uint,
                     &data.geometry.triangles,
-                    false,
+                    usage,
                 )?,
             ),
             (layout::BIND_VERTICES, BindingKind::Texel, vertices),
@@ -159,28 +169,28 @@ impl VulkanBackend {
                     "attributes",
                     TexelFormat::Rgba32Float,
                     &data.geometry.attributes,
-                    false,
+                    usage,
                 )?,
             ),
             (
                 layout::BIND_MATERIALS,
                 BindingKind::Texel,
-                texel(device, "materials", RECORDS, &data.materials, false)?,
+                texel(device, "materials", RECORDS, &data.materials, usage)?,
             ),
             (
                 layout::BIND_TEXTURE_USES,
                 BindingKind::Texel,
-                texel(device, "texture uses", RECORDS, &data.texture_uses, false)?,
+                texel(device, "texture uses", RECORDS, &data.texture_uses, usage)?,
             ),
             (
                 layout::BIND_TEXELS,
                 BindingKind::Texel,
-                texel(device, "texels", TexelFormat::R32Uint, &data.texels, false)?,
+                texel(device, "texels", TexelFormat::R32Uint, &data.texels, usage)?,
             ),
             (
                 layout::BIND_LIGHTS,
                 BindingKind::Texel,
-                texel(device, "lights", RECORDS, &data.lights, false)?,
+                texel(device, "lights", RECORDS, &data.lights, usage)?,
             ),
             (
                 layout::BIND_ENV_MAP,
@@ -190,13 +200,13 @@ impl VulkanBackend {
                     "environment map",
                     TexelFormat::Rgba32Float,
                     &data.env_map,
-                    false,
+                    usage,
                 )?,
             ),
             (
                 layout::BIND_MEDIA,
                 BindingKind::Texel,
-                texel(device, "media", RECORDS, &data.media, false)?,
+                texel(device, "media", RECORDS, &data.media, usage)?,
             ),
             (
                 layout::BIND_ENV_TABLE,
@@ -206,7 +216,7 @@ impl VulkanBackend {
                     "environment table",
                     TexelFormat::Rg32Uint,
                     &data.env_table,
-                    false,
+                    usage,
                 )?,
             ),
             (
@@ -217,10 +227,20 @@ impl VulkanBackend {
                     "allotment",
                     TexelFormat::R32Uint,
                     &vec![0u32; data.allotted_pixels()],
-                    false,
+                    usage,
                 )?,
             ),
         ];
+
+        if by_address {
+            let mut addresses = [0u64; layout::ADDRESSES_SIZE as usize];
+            let inputs = shared.iter().map(|(at, _, buffer)| (*at, buffer));
+            for (at, buffer) in inputs.chain(traversal.texel_buffers()) {
+                addresses[at as usize] = buffer.shader_address().unwrap_or(0);
+            }
+            let buffer = Buffer::from_slice(device, "addresses", Usage::UNIFORM, &addresses)?;
+            shared.push((layout::BIND_ADDRESSES, BindingKind::Uniform, buffer));
+        }
 
         let film = Buffer::new(
             device,
@@ -239,7 +259,8 @@ impl VulkanBackend {
         let mut bindings: Vec<_> = shared.iter().map(|(at, kind, _)| (*at, *kind)).collect();
         bindings.extend([(layout::BIND_FILM, storage), (layout::BIND_LEDGER, storage)]);
         bindings.extend(traversal.bindings());
-        let pipeline = traversal.path_pipeline(device, &spec, &bindings, tuning.study)?;
+        let pipeline =
+            traversal.path_pipeline(device, &spec, &bindings, tuning.study, by_address)?;
         let mut resources: Vec<_> = shared
             .iter()
             .map(|(at, _, buffer)| (*at, Resource::Buffer(buffer)))
@@ -409,19 +430,21 @@ fn upload<T: bytemuck::Pod>(device: &Arc<Device>, name: &str, data: &[T]) -> Res
     Buffer::from_slice(device, name, Usage::STORAGE, data)
 }
 
-/// A texel buffer, of which acceleration structures are built if `is_input`.
+/// Whether the processor gathers, as CPU drivers then do where shaders read by addresses.
+fn can_gather() -> bool {
+    #[cfg(target_arch = "x86_64")]
+    return std::arch::is_x86_feature_detected!("avx512vl");
+    #[cfg(not(target_arch = "x86_64"))]
+    return false;
+}
+
+/// A texel buffer that is used in other ways as well.
 pub(super) fn texel<T: bytemuck::Pod>(
     device: &Arc<Device>,
     name: &str,
     format: TexelFormat,
     data: &[T],
-    is_input: bool,
+    usage: Usage,
 ) -> Result<Buffer> {
-    let usage = Usage::texel(format);
-    let usage = if is_input {
-        usage | Usage::ACCELERATION_INPUT
-    } else {
-        usage
-    };
-    Buffer::from_slice(device, name, usage, data)
+    Buffer::from_slice(device, name, Usage::texel(format) | usage, data)
 }

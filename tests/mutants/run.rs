@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
 use crate::named::{self, Outcome, binaries, root};
-use crate::shaders::{SHADERS, compile};
+use crate::shaders::{Entry, SHADERS, compile_all};
 use crate::{CONTROL, Mutant, mutants, page, planted};
 
 /// Of one test.
@@ -35,7 +35,7 @@ fn is_part(file: &str, of: &str) -> bool {
 }
 
 /// Compiles every shader that the changed file is a part of into `folder`.
-fn compile_planted(compiler: &shaderc::Compiler, mutant: &Mutant, folder: &Path) {
+fn compile_planted(mutant: &Mutant, folder: &Path) {
     let Some(file) = mutant.file.strip_prefix("shaders/") else {
         return;
     };
@@ -50,14 +50,13 @@ fn compile_planted(compiler: &shaderc::Compiler, mutant: &Mutant, folder: &Path)
     let is_of =
         |test: &str, source: &str| source.starts_with("tests/") == test.starts_with("shading::");
     let is_used = |source: &str| mutant.killers.iter().any(|test| is_of(test, source));
-    for (source, macros, name) in SHADERS {
-        if !is_part(file, source) || !is_used(source) {
-            continue;
-        }
-        let level = shaderc::OptimizationLevel::Performance;
-        let spirv = compile(compiler, &read, source, macros, level);
-        std::fs::write(folder.join(format!("{name}.spv")), spirv).unwrap();
-    }
+    let entries: Vec<Entry> = SHADERS
+        .iter()
+        .filter(|(source, ..)| is_part(file, source) && is_used(source))
+        .copied()
+        .collect();
+    let level = shaderc::OptimizationLevel::Performance;
+    compile_all(&entries, level, &read, folder);
 }
 
 /// A row of the matrix.
@@ -132,13 +131,12 @@ fn every_mutant_is_found_and_no_control() {
             .is_none_or(|names| names.split(',').any(|n| n == m.name))
     };
     let binaries = binaries(&["mutants"], &[]);
-    let compiler = shaderc::Compiler::new().unwrap();
     let nothing = tempfile::tempdir().unwrap();
     let mut healthy = BTreeMap::new();
     let mut rows = Vec::new();
     for mutant in mutants().filter(is_chosen) {
         let folder = tempfile::tempdir().unwrap();
-        compile_planted(&compiler, mutant, folder.path());
+        compile_planted(mutant, folder.path());
         let mut row = Row {
             mutant,
             found_by: Vec::new(),
