@@ -76,8 +76,8 @@ fn a_lost_device_loses_no_finished_sample() {
     let line = format!("render scene.gltf -o a.exr {all} --checkpoint c.ck");
     let mut held = 0;
     for (at, manner, says) in [
-        (500, "lost", "device lost during"),
-        (570, "lasting", "memory"),
+        (540, "lost", "device lost during"),
+        (610, "lasting", "memory"),
     ] {
         let fault = format!("vulkan {at} {manner}");
         let output = with_fault(&folder, &format!("{line} --resume"), &fault);
