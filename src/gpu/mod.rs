@@ -15,7 +15,8 @@
 //!    (a missing binding, a range past the end) is a panic that says which.
 //! 5. **Shaders are trusted.** The SPIR-V given to [`Pipeline`] is
 //!    compiled by this crate's build script; that it stays within its buffers is
-//!    proved by tests and validation, not by this module.
+//!    proved by tests and validation, not by this module. What it reads by an
+//!    address is bound as well, which keeps it alive.
 #![allow(
     unsafe_code,
     reason = "Vulkan is a C interface; the five rules above keep it inside this folder"

@@ -52,28 +52,26 @@ impl Usage {
     /// A uniform buffer of a shader.
     pub const UNIFORM: Self = Self::of(vk::BufferUsageFlags::UNIFORM_BUFFER);
     /// Vertices, indices or instances from which acceleration structures are built.
-    pub const ACCELERATION_INPUT: Self = Self::of(vk::BufferUsageFlags::from_raw(
-        vk::BufferUsageFlags::ACCELERATION_STRUCTURE_BUILD_INPUT_READ_ONLY_KHR.as_raw()
-            | vk::BufferUsageFlags::SHADER_DEVICE_ADDRESS.as_raw(),
-    ));
+    pub const ACCELERATION_INPUT: Self =
+        Self::with_address(vk::BufferUsageFlags::ACCELERATION_STRUCTURE_BUILD_INPUT_READ_ONLY_KHR);
     /// Holds an acceleration structure.
-    pub const ACCELERATION_STORAGE: Self = Self::of(vk::BufferUsageFlags::from_raw(
-        vk::BufferUsageFlags::ACCELERATION_STRUCTURE_STORAGE_KHR.as_raw()
-            | vk::BufferUsageFlags::SHADER_DEVICE_ADDRESS.as_raw(),
-    ));
+    pub const ACCELERATION_STORAGE: Self =
+        Self::with_address(vk::BufferUsageFlags::ACCELERATION_STRUCTURE_STORAGE_KHR);
     /// Working memory of a build.
-    pub const SCRATCH: Self = Self::of(vk::BufferUsageFlags::from_raw(
-        vk::BufferUsageFlags::STORAGE_BUFFER.as_raw()
-            | vk::BufferUsageFlags::SHADER_DEVICE_ADDRESS.as_raw(),
-    ));
+    pub const SCRATCH: Self = Self::with_address(vk::BufferUsageFlags::STORAGE_BUFFER);
     /// Handles of the shaders that rays call.
-    pub const SHADER_TABLE: Self = Self::of(vk::BufferUsageFlags::from_raw(
-        vk::BufferUsageFlags::SHADER_BINDING_TABLE_KHR.as_raw()
-            | vk::BufferUsageFlags::SHADER_DEVICE_ADDRESS.as_raw(),
-    ));
+    pub const SHADER_TABLE: Self =
+        Self::with_address(vk::BufferUsageFlags::SHADER_BINDING_TABLE_KHR);
 
     /// Read by shaders at [`super::Buffer::shader_address`], where [`super::Caps::addresses`] says so.
     pub const ADDRESS: Self = Self::of(vk::BufferUsageFlags::SHADER_DEVICE_ADDRESS);
+
+    const fn with_address(flags: vk::BufferUsageFlags) -> Self {
+        let address = vk::BufferUsageFlags::SHADER_DEVICE_ADDRESS;
+        Self::of(vk::BufferUsageFlags::from_raw(
+            flags.as_raw() | address.as_raw(),
+        ))
+    }
 
     const fn of(flags: vk::BufferUsageFlags) -> Self {
         Self { flags, texel: None }

@@ -290,7 +290,7 @@ impl Traversal {
     }
 }
 
-/// The tree on the device in texel buffers that are used in other ways as well, and what is tested before it.
+/// The tree on the device, in texel buffers with `usage` besides, and what is tested before it.
 pub(super) fn upload_bvh(
     device: &Arc<Device>,
     bvh: &Bvh,

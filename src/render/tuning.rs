@@ -18,7 +18,8 @@ pub struct Tuning {
     pub device_bytes: Option<u64>,
     /// Whether few flat pieces are tested without a walk of our own tree; `None`: on CPUs, where it is faster.
     pub planes: Option<bool>,
-    /// Whether a small tree of our own lies in uniform buffers; `None`: on CPUs, which read them faster.
+    /// Whether a small tree of our own lies in uniform buffers; `None`: on CPUs, which read them faster. Never where
+    /// kernels read by addresses.
     pub small: Option<bool>,
     /// Whether kernels read the scene's arrays by their addresses, where the device can; `None`: on CPUs that gather.
     pub addresses: Option<bool>,

@@ -438,7 +438,7 @@ fn can_gather() -> bool {
     return false;
 }
 
-/// A texel buffer that is used in other ways as well.
+/// A texel buffer, with `usage` besides.
 pub(super) fn texel<T: bytemuck::Pod>(
     device: &Arc<Device>,
     name: &str,
