@@ -26,13 +26,24 @@ pub const SHADERS: &[Entry] = &[
     // for the limit report
     (
         "kernel.comp",
-        &["TRAVERSE_SOFTWARE", "TRACE_TWICE"],
-        "path_twice",
+        &["TRAVERSE_SOFTWARE", "TRACE_COUNTS"],
+        "path_counts",
     ),
     (
         "kernel.comp",
-        &["TRAVERSE_SOFTWARE", "TRACE_COUNTS"],
-        "path_counts",
+        &["TRAVERSE_SOFTWARE", "TRACE_RECORDS"],
+        "path_record",
+    ),
+    ("kernel.comp", &["TRAVERSE_RECALL"], "path_recall"),
+    (
+        "kernel.comp",
+        &["TRAVERSE_SOFTWARE", "KERNEL_REPLAY"],
+        "replay_software",
+    ),
+    (
+        "kernel.comp",
+        &["TRAVERSE_QUERY", "KERNEL_REPLAY"],
+        "replay_query",
     ),
     (
         "kernel.comp",
@@ -67,13 +78,23 @@ pub const SHADERS: &[Entry] = &[
     ),
     (
         "kernel.comp",
-        &["TRAVERSE_SOFTWARE", "ADDRESSES", "TRACE_TWICE"],
-        "path_addresses_twice",
+        &["TRAVERSE_SOFTWARE", "ADDRESSES", "TRACE_COUNTS"],
+        "path_addresses_counts",
     ),
     (
         "kernel.comp",
-        &["TRAVERSE_SOFTWARE", "ADDRESSES", "TRACE_COUNTS"],
-        "path_addresses_counts",
+        &["TRAVERSE_RECALL", "ADDRESSES"],
+        "path_addresses_recall",
+    ),
+    (
+        "kernel.comp",
+        &["TRAVERSE_SOFTWARE", "ADDRESSES", "KERNEL_REPLAY"],
+        "replay_software_addresses",
+    ),
+    (
+        "kernel.comp",
+        &["TRAVERSE_QUERY", "ADDRESSES", "KERNEL_REPLAY"],
+        "replay_query_addresses",
     ),
     // as path_software, with what wgpu lacks left out
     ("kernel.comp", &["TRAVERSE_SOFTWARE", "WGPU"], "path_wgpu"),
@@ -92,6 +113,11 @@ pub const SHADERS: &[Entry] = &[
         "kernel.rgen",
         &["TRAVERSE_PIPELINE", "KERNEL_PROBE"],
         "probe_pipeline",
+    ),
+    (
+        "kernel.rgen",
+        &["TRAVERSE_PIPELINE", "KERNEL_REPLAY"],
+        "replay_pipeline",
     ),
     ("trace.rmiss", &[], "trace_miss"),
     ("trace.rchit", &[], "trace_closest_hit"),

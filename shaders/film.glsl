@@ -10,7 +10,6 @@
 #include "scene.glsl"
 
 layout(binding = BIND_FILM, scalar) buffer FilmBlock { float film[]; };
-layout(binding = BIND_LEDGER, scalar) buffer LedgerBlock { uint ledger[]; };
 
 // Levels of the tree that one batch can hold: up to 2^(FILM_LEVELS − 1) samples.
 const uint FILM_LEVELS = 9u;

@@ -17,6 +17,8 @@
 
 #ifdef KERNEL_PROBE
 #include "kernel_probe.glsl"
+#elif defined(KERNEL_REPLAY)
+#include "kernel_replay.glsl"
 #else
 #include "kernel_path.glsl"
 #endif

@@ -2,10 +2,8 @@
 // One invocation computes all samples of its pixel, in order.
 
 #include "film.glsl"
-#include "invocation.glsl"
 #include "path.glsl"
-
-layout(push_constant, scalar) uniform BatchBlock { Batch batch; };
+#include "pixels.glsl"
 
 #if defined(ADDRESSES)
 #define allotment(i) scene_single(BIND_ALLOTMENT, i)
@@ -23,41 +21,6 @@ uint kernel_exponent(uvec2 at)
     }
 #endif
     return exponent;
-}
-
-// Place in the 8 × 8 tile: eight neighbours in the index are a block of 4 × 2 pixels, so that a subgroup stays together.
-uvec2 kernel_place(uint i)
-{
-    return uvec2((i & 3u) | (i >> 1u & 4u), (i >> 2u & 1u) | (i >> 3u & 6u));
-}
-
-// The pixel that the invocation takes next, counted tile by tile through the batch, or NONE. CPU drivers settle beforehand which
-// work groups a thread gets: there few groups take pixels one by one, so that no thread waits for another.
-uint kernel_take(bool is_first)
-{
-    uint k = NONE;
-    if (batch.is_shared != 0u) {
-        k = atomicAdd(ledger[LEDGER_TAKEN], 1u) - batch.taken;
-    } else if (is_first) {
-        k = INVOCATION_GROUP * invocation_group() + invocation_place();
-    }
-    return k < TILE * TILE * batch.tile_count ? k : NONE;
-}
-
-// Where that pixel is in the window.
-uvec2 kernel_pixel(uint k)
-{
-    uint tile = batch.first_tile + k / (TILE * TILE);
-    return TILE * uvec2(tile % params.tiles_x, tile / params.tiles_x) + kernel_place(k % (TILE * TILE));
-}
-
-// Adds to a counter of two words, the low one first.
-void ledger_add(uint low, uint amount)
-{
-    uint before = atomicAdd(ledger[low], amount);
-    if (before > 0xFFFFFFFFu - amount) {
-        atomicAdd(ledger[low + 1u], 1u);
-    }
 }
 
 // The path of sample i of the batch at a pixel of the window, which takes 2^exponent times as many as others.
@@ -92,6 +55,7 @@ void main()
     PathState path;
     path.is_alive = false;
     path.shadow.is_waiting = false;
+    uint number;
     uvec2 at;
     // Of the pixel, and of its sample that is being taken. Before the first pixel all of the one before it are.
     uint exponent = 0u;
@@ -137,22 +101,32 @@ void main()
                     truncated = 0u;
                     truncated_throughput = 0u;
                 }
+#ifdef TRACE_RECORDS
+                stream_finish(number);
+#endif
             }
         }
         if (i == count) {
-            uint k = kernel_take(is_first);
+            uint k = pixels_take(is_first);
             if (k == NONE) {
                 break;
             }
             is_first = false;
-            at = kernel_pixel(k);
+            number = pixels_number(k);
+            at = pixels_at(number);
             if (at.x >= params.window_width || at.y >= params.window_height) {
                 continue;
             }
             i = 0u;
             exponent = kernel_exponent(at);
             count = batch.sample_count << exponent;
+#if defined(TRACE_RECORDS) || defined(TRAVERSE_RECALL)
+            stream_pixel(number);
+#endif
         }
+#ifdef TRACE_RECORDS
+        stream_sample();
+#endif
         path = kernel_start(i, at, exponent);
         result = path_result();
     }

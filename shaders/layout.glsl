@@ -280,6 +280,26 @@ struct ProbeHit {
     uint occluded;              // what trace_occluded says of the same ray
 };
 
+// --- Stream: the rays of a render and what they met (limit report) ---------------
+
+struct StreamRay {
+    vec3 origin;
+    float t_max;
+    vec3 direction;
+    uint from;
+    uint to;                    // triangle that emits the light, or NONE
+    uint flags;                 // STREAM_IS_…
+    uint instance;
+    uint primitive;             // NONE on a miss
+    float t;
+    vec2 bary;
+    uint record;
+};
+
+const uint STREAM_RAY_TEXELS = 4u;
+const uint STREAM_IS_FIRST = 1u;  // a sample begins with it
+const uint STREAM_IS_SHADOW = 2u; // asked if it meets anything
+
 // --- Film ------------------------------------------------------------------------
 
 // Per pixel of the window, FILM_FLOATS (with HAS_AOVS FILM_FLOATS_AOV) floats: sum of radiance, sum of squared
@@ -305,7 +325,9 @@ const uint LEDGER_STEPS_LOW = 11u;
 const uint LEDGER_LANES_LOW = 13u;
 // Pixels that have been taken, where they are shared, and one more for each invocation that found none.
 const uint LEDGER_TAKEN = 15u;
-const uint LEDGER_SIZE = 16u;
+// Rays of a replay that met something else than is recorded.
+const uint LEDGER_DIFFERENT = 16u;
+const uint LEDGER_SIZE = 17u;
 
 const uint TILE = 8u;
 // With HAS_STRATA log₂ of the samples of a block, and of those of a whole net; see rng_key.
@@ -338,6 +360,9 @@ const uint BIND_SMALL_NODES = 20u;   // uniform buffer: SMALL_TEXELS of BIND_BVH
 const uint BIND_SMALL_RECORDS = 21u; // uniform buffer: SMALL_TEXELS of BIND_BVH_TRIANGLES, with HAS_SMALL_RECORDS
 const uint BIND_ALLOTMENT = 22u;     // texel buffer R32UI: an exponent for each pixel of the window, with HAS_ALLOTMENT
 const uint BIND_ADDRESSES = 23u;     // uniform buffer: addresses of texel buffers by their bindings (ADDRESSES)
-const uint ADDRESSES_SIZE = 24u;
+const uint BIND_STREAM = 24u;        // texel buffer RGBA32UI: StreamRay[]; storage in the kernel that records
+const uint BIND_STREAM_STARTS = 25u; // texel buffer R32UI: where the rays of each pixel begin and, one more, where they end
+const uint BIND_STREAM_COUNTS = 26u; // storage: rays of each pixel (kernel that records)
+const uint ADDRESSES_SIZE = 26u;
 
 #endif

@@ -34,5 +34,8 @@ void surface_corners(uint instance, uint primitive, out vec3 a, out vec3 b, out 
 #ifdef TRAVERSE_SOFTWARE
 #include "traverse_software.glsl"
 #endif
+#ifdef TRAVERSE_RECALL
+#include "traverse_recall.glsl"
+#endif
 
 #endif

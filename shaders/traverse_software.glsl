@@ -325,16 +325,17 @@ bool planes_occluded(vec3 origin, vec3 dir, float t_min, float t_max, uint from,
 #include "traverse_planes.glsl"
 #endif
 
+#ifdef TRACE_RECORDS
+#include "stream.glsl"
+#endif
+
 void trace_start() { planes_read(); }
 
 bool trace_closest(vec3 origin, vec3 dir, float t_min, float t_max, uint from, out Hit hit) {
     hit = Hit(t_max, vec2(0.0), NONE, NONE, NONE);
     if (!planes_closest(origin, dir, t_min, t_max, from, hit)) bvh_trace(origin, dir, t_min, t_max, from, false, hit);
-#ifdef TRACE_TWICE
-    // For the limit report. The same hit again, and never nearer, but the compiler does not know.
-    Hit again = Hit(t_max, vec2(0.0), NONE, NONE, NONE);
-    if (!planes_closest(origin, dir, t_min, t_max, from, again)) bvh_trace(origin, dir, t_min, t_max, from, false, again);
-    if (again.t < hit.t) hit = again;
+#ifdef TRACE_RECORDS
+    stream_keep(origin, dir, t_max, from, NONE, 0u, hit);
 #endif
     return hit.primitive != NONE;
 }
@@ -342,10 +343,8 @@ bool trace_closest(vec3 origin, vec3 dir, float t_min, float t_max, uint from, o
 bool trace_occluded(vec3 origin, vec3 dir, float t_min, float t_max, uint from, uint to) {
     Hit hit = Hit(t_max, vec2(0.0), NONE, NONE, NONE);
     if (!planes_occluded(origin, dir, t_min, t_max, from, to, hit)) bvh_trace(origin, dir, t_min, t_max, from, true, hit);
-#ifdef TRACE_TWICE
-    Hit again = Hit(t_max, vec2(0.0), NONE, NONE, NONE);
-    if (!planes_occluded(origin, dir, t_min, t_max, from, to, again)) bvh_trace(origin, dir, t_min, t_max, from, true, again);
-    if (again.t < hit.t) hit = again;
+#ifdef TRACE_RECORDS
+    stream_keep(origin, dir, t_max, from, to, STREAM_IS_SHADOW, hit);
 #endif
     return hit.primitive != NONE;
 }

@@ -191,6 +191,19 @@ shared! {
         record: u32,
         occluded: u32,
     }
+    StreamRay {
+        origin: [f32; 3],
+        t_max: f32,
+        direction: [f32; 3],
+        from: u32,
+        to: u32,
+        flags: u32,
+        instance: u32,
+        primitive: u32,
+        t: f32,
+        bary: [f32; 2],
+        record: u32,
+    }
 }
 
 tags! {
@@ -254,6 +267,9 @@ tags! {
     LIGHT_PLAIN = 0x80000000;
     LIGHT_DOUBLE_SIDED = 0x40000000;
     LIGHT_MIRRORED = 0x20000000;
+    STREAM_RAY_TEXELS = 4;
+    STREAM_IS_FIRST = 1;
+    STREAM_IS_SHADOW = 2;
     FILM_FLOATS = 9;
     FILM_FLOATS_AOV = 18;
     LEDGER_NON_FINITE = 0;
@@ -268,7 +284,8 @@ tags! {
     LEDGER_STEPS_LOW = 11;
     LEDGER_LANES_LOW = 13;
     LEDGER_TAKEN = 15;
-    LEDGER_SIZE = 16;
+    LEDGER_DIFFERENT = 16;
+    LEDGER_SIZE = 17;
     TILE = 8;
     BLOCK_LEVEL = 4;
     NET_LEVEL = 8;
@@ -296,5 +313,8 @@ tags! {
     BIND_SMALL_RECORDS = 21;
     BIND_ALLOTMENT = 22;
     BIND_ADDRESSES = 23;
-    ADDRESSES_SIZE = 24;
+    BIND_STREAM = 24;
+    BIND_STREAM_STARTS = 25;
+    BIND_STREAM_COUNTS = 26;
+    ADDRESSES_SIZE = 26;
 }

@@ -305,12 +305,22 @@ pub(crate) mod kernels {
             kernel!("path_query_addresses_plain"),
         ],
     ];
-    /// As `PATH_SOFTWARE` with everything, but every ray is traced twice: the same image.
-    pub(crate) const PATH_TWICE: [Kernel; 2] =
-        [kernel!("path_twice"), kernel!("path_addresses_twice")];
-    /// The same, and counts what traversal does.
+    /// As `PATH_SOFTWARE` with everything, and counts what traversal does.
     pub(crate) const PATH_COUNTS: [Kernel; 2] =
         [kernel!("path_counts"), kernel!("path_addresses_counts")];
+    /// The same, and keeps every ray with what it met; by texel buffers alone.
+    pub(crate) const PATH_RECORD: Kernel = kernel!("path_record");
+    /// The same, and looks up what rays meet.
+    pub(crate) const PATH_RECALL: [Kernel; 2] =
+        [kernel!("path_recall"), kernel!("path_addresses_recall")];
+    /// Traces recorded rays and shades nothing.
+    pub(crate) const REPLAY_SOFTWARE: [Kernel; 2] = [
+        kernel!("replay_software"),
+        kernel!("replay_software_addresses"),
+    ];
+    pub(crate) const REPLAY_QUERY: [Kernel; 2] =
+        [kernel!("replay_query"), kernel!("replay_query_addresses")];
+    pub(crate) const REPLAY_PIPELINE: Kernel = kernel!("replay_pipeline");
     pub(crate) const PROBE_SOFTWARE: Kernel = kernel!("probe_software");
     pub(crate) const PROBE_QUERY: Kernel = kernel!("probe_query");
     #[cfg(feature = "wgpu")]

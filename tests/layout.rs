@@ -19,13 +19,15 @@ use etendue::spec::Spec;
 use spirv::Module;
 
 /// The kernels that render and probe; test kernels have bindings of their own.
-const KERNELS: [&str; 7] = [
+const KERNELS: [&str; 9] = [
     "path_software",
     "path_query",
     "path_pipeline",
     "probe_software",
     "probe_query",
     "probe_pipeline",
+    "path_record",
+    "replay_software",
     "trace_any_hit",
 ];
 

@@ -20,5 +20,6 @@ layout(binding = 7, scalar) buffer Probe07 { ProbeRay probe_rays[]; };
 layout(binding = 8, scalar) buffer Probe08 { ProbeHit probe_hits[]; };
 layout(binding = 9, scalar) buffer Probe09 { Medium media[]; };
 layout(binding = 10, scalar) buffer Probe10 { Plane planes[]; };
+layout(binding = 11, scalar) buffer Probe11 { StreamRay stream[]; };
 
 void main() {}

@@ -3,10 +3,11 @@
 use std::cell::Cell;
 use std::ops::Range;
 
+use super::stream::Stream;
 use super::traversal::GROUP;
 use super::{Ledger, Memory, TraversalCounts};
-use crate::error::Result;
-use crate::layout::{self, ProbeHit, ProbeRay};
+use crate::error::{Error, Result};
+use crate::layout::{self, ProbeHit, ProbeRay, StreamRay};
 use crate::spec::Spec;
 
 /// A scene on a device, ready to render batches.
@@ -47,6 +48,20 @@ pub(super) trait Backend: Send {
         Ok(TraversalCounts::default())
     }
 
+    /// Takes the rays of a pass, or room for them, where the kernel is made for that.
+    fn hold(&mut self, _stream: &Stream) -> Result<()> {
+        Err(no_stream())
+    }
+
+    /// How many rays of each pixel were recorded, tile by tile.
+    fn recorded_counts(&self) -> Result<Vec<u32>> {
+        Err(no_stream())
+    }
+
+    fn recorded_rays(&self, _count: usize) -> Result<Vec<StreamRay>> {
+        Err(no_stream())
+    }
+
     /// Makes the driver compile: no sample is taken.
     fn warm_up(&mut self) -> Result<()> {
         let batch = Batch {
@@ -57,6 +72,13 @@ pub(super) trait Backend: Send {
             is_together: false,
         };
         self.render(&batch).map(|_| ())
+    }
+}
+
+fn no_stream() -> Error {
+    Error::Unsupported {
+        what: String::from("recorded rays"),
+        missing: String::from("this backend has no kernel for them"),
     }
 }
 

@@ -21,6 +21,7 @@ mod planes;
 mod report;
 mod room;
 pub mod solids;
+mod stream;
 mod team;
 mod traversal;
 mod tuning;
@@ -47,8 +48,9 @@ pub use meter::Reading;
 pub use report::{
     Control, DeviceInfo, Feature, Ledger, Memory, Plan, Progress, Report, SceneModel, Times, Work,
 };
+pub use stream::{Stream, Studied, TraversalCounts};
 pub use team::Team;
-pub use tuning::{Study, TraversalCounts, Tuning};
+pub use tuning::{Study, Tuning};
 pub use workshop::Workshop;
 
 #[cfg(feature = "wgpu")]
@@ -365,15 +367,6 @@ impl Renderer {
     #[doc(hidden)]
     pub fn device_memory(&self) -> (u64, u64) {
         self.backend.device_memory()
-    }
-
-    /// What traversal did in the last pass, where [`Tuning::study`] is [`Study::Counts`].
-    ///
-    /// # Errors
-    /// The device fails.
-    #[doc(hidden)]
-    pub fn traversal_counts(&self) -> Result<TraversalCounts> {
-        self.backend.traversal_counts()
     }
 
     /// What the validation layer said so far.

@@ -182,7 +182,7 @@ impl Traversal {
         }
     }
 
-    /// Compiles the kernel that renders; only that with the own tree can be another for the limit report.
+    /// Compiles the kernel that renders, or one that studies it.
     pub fn path_pipeline(
         &self,
         device: &Arc<Device>,
@@ -192,14 +192,16 @@ impl Traversal {
         by_address: bool,
     ) -> Result<Pipeline> {
         let (address, plain) = (usize::from(by_address), usize::from(spec.is_plain()));
-        let kernel = match self {
-            Self::Software { .. } => match study {
-                Study::None => kernels::PATH_SOFTWARE[address][plain],
-                Study::Twice => kernels::PATH_TWICE[address],
-                Study::Counts => kernels::PATH_COUNTS[address],
-            },
-            Self::Query { .. } => kernels::PATH_QUERY[address][plain],
-            Self::Pipeline { .. } => kernels::PATH_PIPELINE[plain],
+        let kernel = match (self, study) {
+            (Self::Software { .. }, Study::Counts) => kernels::PATH_COUNTS[address],
+            (Self::Software { .. }, Study::Record) => kernels::PATH_RECORD,
+            (Self::Software { .. }, Study::Recall) => kernels::PATH_RECALL[address],
+            (Self::Software { .. }, Study::Replay) => kernels::REPLAY_SOFTWARE[address],
+            (Self::Query { .. }, Study::Replay) => kernels::REPLAY_QUERY[address],
+            (Self::Pipeline { .. }, Study::Replay) => kernels::REPLAY_PIPELINE,
+            (Self::Software { .. }, _) => kernels::PATH_SOFTWARE[address][plain],
+            (Self::Query { .. }, _) => kernels::PATH_QUERY[address][plain],
+            (Self::Pipeline { .. }, _) => kernels::PATH_PIPELINE[plain],
         };
         self.pipeline(device, "path", kernel, spec, bindings)
     }

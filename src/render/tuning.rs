@@ -30,32 +30,28 @@ pub struct Tuning {
     pub study: Study,
 }
 
-/// Kernels for the limit report; for our own tree only.
+/// Kernels for the limit report.
 #[doc(hidden)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Study {
     /// The kernel that everybody uses.
     #[default]
     None,
-    /// Traces every ray twice: the same image, later by the time that traversal takes.
-    Twice,
-    /// Counts what traversal does.
+    /// Counts what our own tree's traversal does.
     Counts,
+    /// Keeps the rays that our own tree is asked, and what they meet.
+    Record,
+    /// Looks up what rays meet instead of tracing them: the same image, sooner by the time that traversal takes.
+    Recall,
+    /// Traces recorded rays, by any traversal, and renders nothing.
+    Replay,
 }
 
-/// What traversal did in a pass.
-#[doc(hidden)]
-#[derive(Clone, Copy, Debug, Default)]
-pub struct TraversalCounts {
-    pub rays: u64,
-    /// Nodes visited.
-    pub nodes: u64,
-    /// Leaf records read.
-    pub records: u64,
-    /// Steps that lanes made.
-    pub steps: u64,
-    /// Steps that all lanes of their subgroups had time for.
-    pub lane_steps: u64,
+impl Study {
+    /// Whether the kernel reads or writes rays.
+    pub(super) fn has_stream(self) -> bool {
+        matches!(self, Self::Record | Self::Recall | Self::Replay)
+    }
 }
 
 impl Default for Tuning {

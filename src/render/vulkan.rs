@@ -4,19 +4,22 @@
 use std::cell::Cell;
 use std::sync::Arc;
 
+use bytemuck::cast_slice;
+
 use super::backend::{Backend, Batch, Frame, film_bytes, film_floats, read_ledger};
 use super::planes::Planes;
 use super::room;
+use super::stream::{self, Stream};
 use super::traversal::{GROUP, Traversal, build_scene, note_roots, note_small, upload_bvh};
 use super::upload::SceneData;
-use super::{DeviceOptions, Ledger, Memory, TraversalCounts, Tuning, Workshop};
+use super::{DeviceOptions, Ledger, Memory, Study, TraversalCounts, Tuning, Workshop};
 use crate::bvh::Bvh;
 use crate::error::{Error, Result};
 use crate::gpu::{
     self, BindSet, BindingKind, Buffer, Device, DeviceKind, DeviceRequest, Pipeline, Resource,
     TexelFormat, Usage,
 };
-use crate::layout::{self, ProbeHit, ProbeRay};
+use crate::layout::{self, ProbeHit, ProbeRay, StreamRay};
 use crate::settings::BackendChoice;
 use crate::spec;
 
@@ -62,20 +65,24 @@ pub(super) fn open(
     Ok((device, BackendChoice::Bvh, reason))
 }
 
+/// A buffer with its binding.
+pub(super) type Input = (u32, BindingKind, Buffer);
+
 /// A scene on a device, ready to render batches.
 pub(super) struct VulkanBackend {
     device: Arc<Device>,
     traversal: Traversal,
     params: layout::Params,
     spec: spec::Spec,
-    /// Everything that both kernels read, with its binding.
-    shared: Vec<(u32, BindingKind, Buffer)>,
+    /// Everything that both kernels read.
+    shared: Vec<Input>,
     film: Buffer,
     ledger: Buffer,
     pipeline: Pipeline,
     set: BindSet,
     /// Pixels that were taken since the ledger was reset, where they are shared.
     taken: Option<Cell<u32>>,
+    study: Study,
     memory: Memory,
 }
 
@@ -95,6 +102,7 @@ impl VulkanBackend {
         let mut memory = room::estimate(data, bvh.as_ref(), film_bytes);
         room::check(device, &memory, tuning.device_bytes)?;
         let by_address = choice != BackendChoice::RayPipeline
+            && tuning.study != Study::Record
             && device.caps().addresses
             && tuning.addresses.unwrap_or(is_cpu && can_gather());
         let usage = match by_address {
@@ -137,108 +145,43 @@ impl VulkanBackend {
                 }
             }
         };
-        let storage = BindingKind::Storage;
+        let input = |at, name, format, data: &[u8]| -> Result<Input> {
+            let buffer = texel(device, name, format, data, usage)?;
+            Ok((at, BindingKind::Texel, buffer))
+        };
+        let float = TexelFormat::Rgba32Float;
+        let (word, pair) = (TexelFormat::R32Uint, TexelFormat::Rg32Uint);
+        let allotment = vec![0u32; data.allotted_pixels()];
+        let geometry = &data.geometry;
         let mut shared = vec![
             (
                 layout::BIND_PARAMS,
                 BindingKind::Uniform,
                 Buffer::from_slice(device, "params", Usage::UNIFORM, &[params])?,
             ),
-            (
-                layout::BIND_INSTANCES,
-                BindingKind::Texel,
-                texel(device, "instances", RECORDS, &instances, usage)?,
-            ),
-            (
-                layout::BIND_TRIANGLES,
-                BindingKind::Texel,
-                texel(
-                    device,
-                    "triangles",
-                    TexelFormat::Rgba32Uint,
-                    &data.geometry.triangles,
-                    usage,
-                )?,
-            ),
             (layout::BIND_VERTICES, BindingKind::Texel, vertices),
-            (
-                layout::BIND_ATTRIBUTES,
-                BindingKind::Texel,
-                texel(
-                    device,
-                    "attributes",
-                    TexelFormat::Rgba32Float,
-                    &data.geometry.attributes,
-                    usage,
-                )?,
-            ),
-            (
-                layout::BIND_MATERIALS,
-                BindingKind::Texel,
-                texel(device, "materials", RECORDS, &data.materials, usage)?,
-            ),
-            (
-                layout::BIND_TEXTURE_USES,
-                BindingKind::Texel,
-                texel(device, "texture uses", RECORDS, &data.texture_uses, usage)?,
-            ),
-            (
-                layout::BIND_TEXELS,
-                BindingKind::Texel,
-                texel(device, "texels", TexelFormat::R32Uint, &data.texels, usage)?,
-            ),
-            (
-                layout::BIND_LIGHTS,
-                BindingKind::Texel,
-                texel(device, "lights", RECORDS, &data.lights, usage)?,
-            ),
-            (
-                layout::BIND_ENV_MAP,
-                BindingKind::Texel,
-                texel(
-                    device,
-                    "environment map",
-                    TexelFormat::Rgba32Float,
-                    &data.env_map,
-                    usage,
-                )?,
-            ),
-            (
-                layout::BIND_MEDIA,
-                BindingKind::Texel,
-                texel(device, "media", RECORDS, &data.media, usage)?,
-            ),
-            (
-                layout::BIND_ENV_TABLE,
-                BindingKind::Texel,
-                texel(
-                    device,
-                    "environment table",
-                    TexelFormat::Rg32Uint,
-                    &data.env_table,
-                    usage,
-                )?,
-            ),
-            (
-                layout::BIND_ALLOTMENT,
-                BindingKind::Texel,
-                texel(
-                    device,
-                    "allotment",
-                    TexelFormat::R32Uint,
-                    &vec![0u32; data.allotted_pixels()],
-                    usage,
-                )?,
-            ),
         ];
-
+        #[rustfmt::skip]
+        shared.extend([
+            input(layout::BIND_INSTANCES, "instances", RECORDS, cast_slice(&instances))?,
+            input(layout::BIND_TRIANGLES, "triangles", RECORDS, cast_slice(&geometry.triangles))?,
+            input(layout::BIND_ATTRIBUTES, "attributes", float, cast_slice(&geometry.attributes))?,
+            input(layout::BIND_MATERIALS, "materials", RECORDS, cast_slice(&data.materials))?,
+            input(layout::BIND_TEXTURE_USES, "texture uses", RECORDS, cast_slice(&data.texture_uses))?,
+            input(layout::BIND_TEXELS, "texels", word, cast_slice(&data.texels))?,
+            input(layout::BIND_LIGHTS, "lights", RECORDS, cast_slice(&data.lights))?,
+            input(layout::BIND_ENV_MAP, "environment map", float, cast_slice(&data.env_map))?,
+            input(layout::BIND_ENV_TABLE, "environment table", pair, cast_slice(&data.env_table))?,
+            input(layout::BIND_MEDIA, "media", RECORDS, cast_slice(&data.media))?,
+            input(layout::BIND_ALLOTMENT, "allotment", word, cast_slice(&allotment))?,
+        ]);
+        if tuning.study.has_stream() {
+            let none = Stream::with_room(&[])?;
+            shared.extend(stream::inputs(device, &none, tuning.study, usage)?);
+        }
         if by_address {
-            let mut addresses = [0u64; layout::ADDRESSES_SIZE as usize];
-            let inputs = shared.iter().map(|(at, _, buffer)| (*at, buffer));
-            for (at, buffer) in inputs.chain(traversal.texel_buffers()) {
-                addresses[at as usize] = buffer.shader_address().unwrap_or(0);
-            }
-            let buffer = Buffer::from_slice(device, "addresses", Usage::UNIFORM, &addresses)?;
+            let table = addresses(&shared, &traversal);
+            let buffer = Buffer::from_slice(device, "addresses", Usage::UNIFORM, &table)?;
             shared.push((layout::BIND_ADDRESSES, BindingKind::Uniform, buffer));
         }
 
@@ -256,21 +199,14 @@ impl VulkanBackend {
             Usage::STORAGE,
             gpu::Memory::DeviceLocal,
         )?;
+        let storage = BindingKind::Storage;
         let mut bindings: Vec<_> = shared.iter().map(|(at, kind, _)| (*at, *kind)).collect();
         bindings.extend([(layout::BIND_FILM, storage), (layout::BIND_LEDGER, storage)]);
         bindings.extend(traversal.bindings());
         let pipeline =
             traversal.path_pipeline(device, &spec, &bindings, tuning.study, by_address)?;
-        let mut resources: Vec<_> = shared
-            .iter()
-            .map(|(at, _, buffer)| (*at, Resource::Buffer(buffer)))
-            .collect();
-        resources.extend([
-            (layout::BIND_FILM, Resource::Buffer(&film)),
-            (layout::BIND_LEDGER, Resource::Buffer(&ledger)),
-        ]);
-        resources.extend(traversal.resources());
-        let set = BindSet::new(&pipeline, "path", &resources)?;
+        let others = [(layout::BIND_FILM, &film), (layout::BIND_LEDGER, &ledger)];
+        let set = bind(&pipeline, "path", &shared, &others, &traversal)?;
         memory.acceleration = traversal.bytes();
         Ok(Self {
             device: Arc::clone(device),
@@ -283,16 +219,21 @@ impl VulkanBackend {
             pipeline,
             set,
             taken: is_cpu.then(Cell::default),
+            study: tuning.study,
             memory,
         })
     }
 }
 
 impl VulkanBackend {
-    fn shared(&self, binding: u32) -> &Buffer {
+    fn find(&self, binding: u32) -> Option<&Buffer> {
         let mut inputs = self.shared.iter();
         let input = inputs.find(|(at, _, _)| *at == binding);
-        &input.expect("every kernel has it").2
+        input.map(|(_, _, buffer)| buffer)
+    }
+
+    fn shared(&self, binding: u32) -> &Buffer {
+        self.find(binding).expect("the kernel has it")
     }
 }
 
@@ -364,7 +305,45 @@ impl Backend for VulkanBackend {
             records: pair(layout::LEDGER_RECORDS_LOW),
             steps: pair(layout::LEDGER_STEPS_LOW),
             lane_steps: pair(layout::LEDGER_LANES_LOW),
+            different: words[layout::LEDGER_DIFFERENT as usize].into(),
         })
+    }
+
+    fn hold(&mut self, stream: &Stream) -> Result<()> {
+        let table = self.find(layout::BIND_ADDRESSES).cloned();
+        let usage = match table {
+            Some(_) => Usage::ADDRESS,
+            None => Usage::default(),
+        };
+        let inputs = stream::inputs(&self.device, stream, self.study, usage)?;
+        self.shared
+            .retain(|(at, ..)| inputs.iter().all(|input| input.0 != *at));
+        self.shared.extend(inputs);
+        if let Some(table) = table {
+            table.write(0, &addresses(&self.shared, &self.traversal))?;
+        }
+        let others = [
+            (layout::BIND_FILM, &self.film),
+            (layout::BIND_LEDGER, &self.ledger),
+        ];
+        self.set = bind(
+            &self.pipeline,
+            "path",
+            &self.shared,
+            &others,
+            &self.traversal,
+        )?;
+        Ok(())
+    }
+
+    fn recorded_counts(&self) -> Result<Vec<u32>> {
+        let pixels = self.frame().tiles() * layout::TILE * layout::TILE;
+        self.shared(layout::BIND_STREAM_COUNTS)
+            .read(pixels as usize)
+    }
+
+    fn recorded_rays(&self, count: usize) -> Result<Vec<StreamRay>> {
+        self.shared(layout::BIND_STREAM).read(count)
     }
 
     fn probe(&self, rays: &[ProbeRay]) -> Result<Vec<ProbeHit>> {
@@ -391,17 +370,11 @@ impl Backend for VulkanBackend {
                 Usage::STORAGE,
                 gpu::Memory::DeviceLocal,
             )?;
-            let mut resources: Vec<_> = self
-                .shared
-                .iter()
-                .map(|(at, _, buffer)| (*at, Resource::Buffer(buffer)))
-                .collect();
-            resources.extend([
-                (layout::BIND_PROBE_RAYS, Resource::Buffer(&input)),
-                (layout::BIND_PROBE_HITS, Resource::Buffer(&output)),
-            ]);
-            resources.extend(self.traversal.resources());
-            let set = BindSet::new(&pipeline, "probe", &resources)?;
+            let others = [
+                (layout::BIND_PROBE_RAYS, &input),
+                (layout::BIND_PROBE_HITS, &output),
+            ];
+            let set = bind(&pipeline, "probe", &self.shared, &others, traversal)?;
             let push = layout::Batch {
                 sample_count: some.len() as u32,
                 ..Default::default()
@@ -414,6 +387,34 @@ impl Backend for VulkanBackend {
         }
         Ok(hits)
     }
+}
+
+/// The addresses of texel buffers, by their bindings.
+fn addresses(shared: &[Input], traversal: &Traversal) -> [u64; layout::ADDRESSES_SIZE as usize] {
+    let mut addresses = [0u64; layout::ADDRESSES_SIZE as usize];
+    let inputs = shared
+        .iter()
+        .filter(|(_, kind, _)| *kind == BindingKind::Texel);
+    let inputs = inputs.map(|(at, _, buffer)| (*at, buffer));
+    for (at, buffer) in inputs.chain(traversal.texel_buffers()) {
+        addresses[at as usize] = buffer.shader_address().unwrap_or(0);
+    }
+    addresses
+}
+
+/// What a kernel reads and writes.
+fn bind(
+    pipeline: &Pipeline,
+    name: &str,
+    shared: &[Input],
+    others: &[(u32, &Buffer)],
+    traversal: &Traversal,
+) -> Result<BindSet> {
+    let inputs = shared.iter().map(|(at, _, buffer)| (*at, buffer));
+    let buffers = inputs.chain(others.iter().copied());
+    let mut resources: Vec<_> = buffers.map(|(at, b)| (at, Resource::Buffer(b))).collect();
+    resources.extend(traversal.resources());
+    BindSet::new(pipeline, name, &resources)
 }
 
 fn upload<T: bytemuck::Pod>(device: &Arc<Device>, name: &str, data: &[T]) -> Result<Buffer> {

@@ -40,7 +40,7 @@ fn a_tiny_bench_is_measured_and_drawn() {
     );
     let first = lines(&folder, "bench.jsonl");
     assert_eq!(first[0]["kind"], "machine");
-    assert_eq!(first[0]["schema"], 1);
+    assert_eq!(first[0]["schema"], 2);
     let scenes = of(&first, "scene");
     assert_eq!(scenes.len(), 1);
     assert_eq!(scenes[0]["reference_spp"], 512);
@@ -75,6 +75,13 @@ fn a_tiny_bench_is_measured_and_drawn() {
         assert!((0.0..=1.0).contains(&number("lane_use")), "{limit}");
         assert!(number("lane_use") > 0.1, "{limit}");
         assert!(number("bandwidth") > 1e8, "{limit}");
+        for part in ["shading", "replay", "sorted", "ray_query"] {
+            assert!(number(&format!("seconds_{part}")) > 0.0, "{limit}");
+        }
+        assert!(
+            number("different_ray_query") <= 1e-3 * number("rays"),
+            "{limit}"
+        );
     }
     assert!(of(&first, "growth").len() > 3);
     assert_eq!(of(&first, "picture").len(), 3);
@@ -95,7 +102,7 @@ fn a_tiny_bench_is_measured_and_drawn() {
         "√relMSE",
         "bvh",
         "slope −½",
-        "shading and the rest",
+        "traversal: its rays alone",
     ] {
         assert!(svg.contains(text), "{text}");
         assert!(html.contains(text), "{text}");

@@ -89,11 +89,7 @@ fn same_seed_gives_the_same_bits_however_the_work_is_cut() {
                 max_tiles: 64,
                 ..default
             },
-            // the kernels of the limit report
-            Tuning {
-                study: Study::Twice,
-                ..default
-            },
+            // a kernel of the limit report
             Tuning {
                 study: Study::Counts,
                 ..default

@@ -25,6 +25,7 @@ mod gap;
 mod identity;
 mod pictures;
 mod planes;
+mod replay;
 mod scenes;
 mod soup;
 mod table;

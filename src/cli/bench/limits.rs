@@ -1,24 +1,26 @@
 //! The limit report: where the time of our own tree goes, and how far the machine is from its limits.
 //!
-//! Traversal is measured in place: a kernel that traces every ray twice renders the same image, and the time that it
-//! takes longer is that of tracing the real stream of rays with the real lanes. The second walk finds its nodes in the
-//! caches, so this is a lower bound of traversal.
+//! The rays of a pass are recorded with what they met. Then the same pass is rendered as always; without traversal, what
+//! rays meet being looked up; and its rays are traced alone: in their order, sorted, and by the device's ray query.
 
 use std::hint::black_box;
 use std::path::Path;
 use std::time::Instant;
 
-use etendue::render::{DeviceOptions, Renderer, Study, TraversalCounts, Tuning};
+use anyhow::anyhow;
+use etendue::error::Error;
+use etendue::render::{DeviceOptions, Renderer, Stream, Studied, Study, TraversalCounts, Tuning};
 use etendue::scene::Scene;
 use etendue::settings::{BackendChoice, Estimator, Settings};
 
-use super::super::failure::Failure;
-use super::contender::{render_all, warm_up};
-use super::record::{Limit, Line};
+use super::super::failure::{FAILED, Failure};
+use super::record::{Limit, Line, Skipped};
 use super::{Output, scene_name};
 
-/// Samples a pixel of a round; one pass, so that counts are of all of it.
-const SPP: u64 = 16;
+/// log₂ of the samples of the pass; of fewer where the device's buffers do not hold its rays.
+const LEVEL: u32 = 4;
+/// Passes before the first round: the size of batches and the pace of lanes are found.
+const WARM_UPS: usize = 2;
 /// Bytes of a node and of a leaf record of our own tree (src/bvh/mod.rs).
 const NODE_BYTES: f64 = 80.0;
 const RECORD_BYTES: f64 = 64.0;
@@ -27,7 +29,7 @@ const READ_BYTES: usize = 256 << 20;
 /// The best of so many counts.
 const READ_ROUNDS: usize = 3;
 
-/// Renders by the plain kernel and by those that study it, in turns.
+/// Renders and replays in turns.
 pub fn run(
     path: &Path,
     scene: &Scene,
@@ -37,65 +39,123 @@ pub fn run(
     out: &mut Output,
 ) -> Result<(), Failure> {
     let name = scene_name(path);
-    let settings = Settings {
-        backend: BackendChoice::Bvh,
-        estimator: Estimator::Full,
-        ..settings.clone()
-    };
-    let renderer = |study: Study| {
+    let renderer = |backend: BackendChoice, study: Study| {
+        let settings = Settings {
+            backend,
+            estimator: Estimator::Full,
+            ..settings.clone()
+        };
         let tuning = Tuning {
+            // the device's own test of triangles is part of what is measured
+            boxes: Some(false),
             study,
             ..Tuning::default()
         };
         Renderer::tuned(scene, &settings, options, tuning)
     };
-    let counts = {
-        let mut counter = renderer(Study::Counts)?;
-        render_all(&mut counter, SPP, 1)?;
-        counter.traversal_counts()?
+    let own = |study: Study| renderer(BackendChoice::Bvh, study);
+    let (level, stream) = match record(&mut own(Study::Record)?)? {
+        Ok(recording) => recording,
+        Err(reason) => {
+            let contender = String::from("limits");
+            return out.line(&Line::Skipped(Skipped {
+                scene: name,
+                contender,
+                reason,
+            }));
+        }
     };
+    let counts = own(Study::Counts)?.study(level)?.counts;
     let bandwidth = bandwidth();
-    let mut plain = renderer(Study::None)?;
-    let mut twice = renderer(Study::Twice)?;
-    for renderer in [&mut plain, &mut twice] {
-        warm_up(renderer)?;
+    let holding = |backend: BackendChoice, study: Study, stream: &Stream| {
+        let mut renderer = renderer(backend, study)?;
+        renderer.hold(stream)?;
+        Ok::<_, Error>(renderer)
+    };
+    let mut kernels = vec![
+        own(Study::None)?,
+        holding(BackendChoice::Bvh, Study::Recall, &stream)?,
+        holding(BackendChoice::Bvh, Study::Replay, &stream)?,
+        holding(BackendChoice::Bvh, Study::Replay, &stream.sorted())?,
+    ];
+    match holding(BackendChoice::RayQuery, Study::Replay, &stream) {
+        Ok(query) => kernels.push(query),
+        Err(Error::Unsupported { .. }) => {}
+        Err(error) => return Err(error.into()),
+    }
+    drop(stream);
+    for _ in 0..WARM_UPS {
+        for kernel in &mut kernels {
+            kernel.study(level)?;
+        }
     }
     for round in 1..=rounds {
-        let seconds = |renderer: &mut Renderer| -> Result<f64, Failure> {
-            render_all(renderer, SPP, round)?;
-            Ok(renderer.report().times.render)
-        };
-        let (once, again) = (seconds(&mut plain)?, seconds(&mut twice)?);
-        let rays = plain.report().rays;
-        let line = record(&name, round, (once, again), rays, counts, bandwidth);
+        let passes: Result<Vec<Studied>, Error> = kernels
+            .iter_mut()
+            .map(|kernel| kernel.study(level))
+            .collect();
+        let line = line(&name, round, level, &passes?, counts, bandwidth)?;
         out.line(&Line::Limit(line))?;
     }
     Ok(())
 }
 
-fn record(
+/// The rays of a pass of as many samples as fit, and log₂ of these; or why there is none.
+fn record(recorder: &mut Renderer) -> Result<Result<(u32, Stream), String>, Failure> {
+    let features = recorder.report().features;
+    if features.iter().any(|f| f.name == "nested" && f.on) {
+        let reason = "between touching solids rays pass what those before them met";
+        return Ok(Err(String::from(reason)));
+    }
+    let mut level = LEVEL;
+    loop {
+        match recorder.record(level) {
+            Ok(stream) => return Ok(Ok((level, stream))),
+            Err(Error::Unsupported { .. }) if level > 0 => level -= 1,
+            Err(error @ Error::Unsupported { .. }) => return Ok(Err(error.to_string())),
+            Err(error) => return Err(error.into()),
+        }
+    }
+}
+
+/// From the passes of the kernels, in their order.
+fn line(
     scene: &str,
     round: u64,
-    (seconds, seconds_twice): (f64, f64),
-    rays: u64,
+    level: u32,
+    passes: &[Studied],
     counts: TraversalCounts,
     bandwidth: f64,
-) -> Limit {
+) -> Result<Limit, Failure> {
+    let [plain, shading, replay, sorted, query @ ..] = passes else {
+        unreachable!("every round has these");
+    };
+    let different = replay.counts.different + sorted.counts.different;
+    if different > 0 {
+        let error = anyhow!("{different} rays of {scene} met something else than before");
+        return Err(Failure::new(FAILED, error, "replay a render"));
+    }
     let per_ray = |n: u64| n as f64 / counts.rays.max(1) as f64;
     let (nodes, records) = (per_ray(counts.nodes), per_ray(counts.records));
-    Limit {
+    let query = query.first();
+    Ok(Limit {
         scene: scene.to_owned(),
         round,
-        spp: SPP,
-        seconds,
-        seconds_twice,
-        rays_per_second: rays as f64 / seconds,
+        spp: 1 << level,
+        seconds: plain.seconds,
+        seconds_shading: shading.seconds,
+        seconds_replay: replay.seconds,
+        seconds_sorted: sorted.seconds,
+        seconds_ray_query: query.map(|pass| pass.seconds),
+        different_ray_query: query.map(|pass| pass.counts.different),
+        rays: counts.rays,
+        rays_per_second: counts.rays as f64 / plain.seconds,
         nodes_per_ray: nodes,
         records_per_ray: records,
         bytes_per_ray: NODE_BYTES * nodes + RECORD_BYTES * records,
         lane_use: counts.steps as f64 / counts.lane_steps.max(1) as f64,
         bandwidth,
-    }
+    })
 }
 
 /// Bytes a second that all processors together read from memory, one after the other.

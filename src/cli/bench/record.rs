@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 /// Changes when a name is changed or removed; additions do not count.
-pub const SCHEMA: u32 = 1;
+pub const SCHEMA: u32 = 2;
 
 /// One line.
 #[derive(Clone, Debug, Deserialize, Serialize)]
@@ -179,8 +179,18 @@ pub struct Limit {
     pub round: u64,
     pub spp: u64,
     pub seconds: f64,
-    /// Of a kernel that traces every ray twice.
-    pub seconds_twice: f64,
+    /// The same, what rays meet being looked up.
+    pub seconds_shading: f64,
+    /// Its rays alone, in their order …
+    pub seconds_replay: f64,
+    /// … sorted, …
+    pub seconds_sorted: f64,
+    /// … and by the device's ray query; absent where it has none.
+    pub seconds_ray_query: Option<f64>,
+    /// Rays that met something else there.
+    pub different_ray_query: Option<u64>,
+    /// Of the pass.
+    pub rays: u64,
     pub rays_per_second: f64,
     /// Nodes visited.
     pub nodes_per_ray: f64,

@@ -127,6 +127,20 @@ pub fn limit_lines(lines: &[Line]) -> Vec<&Limit> {
     all.collect()
 }
 
+/// Parts of the time of a render that are measured by themselves, and the share of each.
+type Part = (&'static str, fn(&Limit) -> f64);
+const PARTS: [Part; 3] = [
+    ("traversal: its rays alone", |l| {
+        l.seconds_replay / l.seconds
+    }),
+    ("shading: what rays meet is known", |l| {
+        l.seconds_shading / l.seconds
+    }),
+    ("the rest", |l| {
+        1.0 - (l.seconds_replay + l.seconds_shading) / l.seconds
+    }),
+];
+
 /// How traversal and shading share the time of our own tree.
 pub fn limits(lines: &[Line]) -> Vec<Panel> {
     let all = limit_lines(lines);
@@ -135,20 +149,16 @@ pub fn limits(lines: &[Line]) -> Vec<Panel> {
     }
     let mut bars = Vec::new();
     for scene in distinct(all.iter().map(|l| l.scene.as_str())) {
-        let own = all.iter().filter(|l| l.scene == scene);
-        let shares: Vec<f64> = own.map(|l| 100.0 * traversal_share(l)).collect();
-        let (low, high) = (quantile(&shares, BAND.0), quantile(&shares, BAND.1));
-        let share = quantile(&shares, 0.5);
-        for (name, value) in [
-            ("traversal, at least", share),
-            ("shading and the rest", 100.0 - share),
-        ] {
+        for (name, share) in PARTS {
+            let own = all.iter().filter(|l| l.scene == scene);
+            // what is measured by parts may take longer than the whole
+            let shares: Vec<f64> = own.map(|l| 100.0 * share(l).max(0.0)).collect();
             bars.push(Bar {
                 group: scene.to_owned(),
                 name: name.to_owned(),
-                value,
-                low,
-                high,
+                value: quantile(&shares, 0.5),
+                low: quantile(&shares, BAND.0),
+                high: quantile(&shares, BAND.1),
             });
         }
     }
@@ -157,11 +167,6 @@ pub fn limits(lines: &[Line]) -> Vec<Panel> {
         bars,
         is_stacked: true,
     })]
-}
-
-/// Of the time of a render: what tracing every ray a second time adds.
-pub fn traversal_share(limit: &Limit) -> f64 {
-    (limit.seconds_twice / limit.seconds - 1.0).clamp(0.0, 1.0)
 }
 
 /// What a panel of a sweep shows: title, its vertical axis, the value.

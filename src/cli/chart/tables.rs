@@ -272,19 +272,32 @@ pub fn rates(lines: &[Line]) -> Table {
 /// Where the time goes, and how far the machine is from its limits.
 pub fn limits(lines: &[Line]) -> Table {
     let all = panels::limit_lines(lines);
+    let query = |scene: &str| {
+        let own = all.iter().filter(|l| l.scene == scene);
+        let ratio = |l: &&Limit| Some(l.seconds_ray_query? / l.seconds_replay);
+        let ratios: Vec<f64> = own.filter_map(ratio).collect();
+        match ratios.is_empty() {
+            true => String::from("–"),
+            false => plain(quantile(&ratios, 0.5)),
+        }
+    };
     let row = |scene: &str| {
         let of = |f: &dyn Fn(&Limit) -> f64| -> Vec<f64> {
             let own = all.iter().filter(|l| l.scene == scene);
             own.map(|l| f(l)).collect()
         };
         let median = |f: &dyn Fn(&Limit) -> f64| plain(quantile(&of(f), 0.5));
-        let shares = of(&|l| 100.0 * panels::traversal_share(l));
+        let shares = of(&|l| 100.0 * l.seconds_replay / l.seconds);
         let loads = |l: &Limit| l.rays_per_second * l.bytes_per_ray;
         vec![
             scene.to_owned(),
             plain(quantile(&shares, 0.5)),
             range((quantile(&shares, 0.0), quantile(&shares, 1.0))),
+            median(&|l| 100.0 * l.seconds_shading / l.seconds),
             median(&|l| l.rays_per_second / 1e6),
+            median(&|l| l.rays as f64 / l.seconds_replay / 1e6),
+            median(&|l| l.seconds_replay / l.seconds_sorted),
+            query(scene),
             median(&|l| l.nodes_per_ray),
             median(&|l| l.records_per_ray),
             median(&|l| l.bytes_per_ray),
@@ -298,9 +311,13 @@ pub fn limits(lines: &[Line]) -> Table {
         title: "Limits of our own tree",
         head: vec![
             "scene",
-            "traversal at least, % of time",
+            "traversal (rays alone), % of time",
             "over the rounds",
+            "shading (hits known), %",
             "Mrays/s",
+            "Mrays/s alone",
+            "sorted over unsorted",
+            "own tree over ray query, rays alone",
             "nodes a ray",
             "records a ray",
             "bytes a ray",
