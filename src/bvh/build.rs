@@ -7,6 +7,7 @@ use std::path::PathBuf;
 use glam::{DVec3, Vec3};
 use obvhs::aabb::Aabb;
 
+use super::grid::Grid;
 use super::pairs::pair;
 use super::topology::{Effort, Slot, Topology};
 use super::{
@@ -15,8 +16,6 @@ use super::{
 };
 use crate::error::{Error, Result};
 
-/// Smallest biased exponent of a cell: keeps the cell and its products with ray slopes normal numbers.
-const MIN_CELL_EXPONENT: i32 = 27;
 /// Rounding of a ray that is moved to object space, relative to the terms of the transform: three products, three
 /// sums and the inverse's own rounding make seven halves of 2⁻²³; about twice that.
 const TRANSFORM_ROUNDING: f64 = 16.0 / (1u64 << 24) as f64;
@@ -158,43 +157,22 @@ impl Bvh {
 /// A node's grid and the boxes of its children on it, rounded outwards so that they contain `children` exactly.
 fn quantise(bounds: &Aabb, children: &[Option<Aabb>; 8]) -> Node {
     let mut node: Node = [0; 20];
+    let grid = Grid::around(bounds);
     for axis in 0..3 {
-        let (low, high) = (f64::from(bounds.min[axis]), f64::from(bounds.max[axis]));
-        if low > high {
+        if bounds.min[axis] > bounds.max[axis] {
             continue; // no children
         }
-        let mut exponent =
-            (((high - low) / 255.0).log2().ceil() as i32 + 127).clamp(MIN_CELL_EXPONENT, 254);
-        while low + 255.0 * cell(exponent) < high {
-            exponent += 1; // the logarithm was rounded down
-        }
-        let cell = cell(exponent);
         node[axis] = bounds.min[axis].to_bits();
-        node[3] |= (exponent as u32) << (8 * axis);
+        node[3] |= (grid.exponents[axis] as u32) << (8 * axis);
         for (slot, child) in children.iter().enumerate() {
             let Some(child) = child else { continue };
-            let (min, max) = (f64::from(child.min[axis]), f64::from(child.max[axis]));
-            let mut lower = ((min - low) / cell).floor().clamp(0.0, 255.0);
-            let mut upper = ((max - low) / cell).ceil().clamp(0.0, 255.0);
-            // Subtraction may round when the magnitudes differ very much.
-            while low + lower * cell > min {
-                lower -= 1.0;
-            }
-            while low + upper * cell < max {
-                upper += 1.0;
-            }
-            for (plane, offset) in [(lower, 0), (upper, 8)] {
+            for (plane, offset) in grid.planes(child, axis).into_iter().zip([0, 8]) {
                 let index = slot + offset;
                 node[8 + 4 * axis + index / 4] |= (plane as u32) << (8 * (index % 4));
             }
         }
     }
     node
-}
-
-/// Size of a cell with this biased exponent.
-fn cell(exponent: i32) -> f64 {
-    f64::powi(2.0, exponent - 127)
 }
 
 fn triangle_box(corners: &[Vec3; 3], index: usize) -> Result<Aabb> {

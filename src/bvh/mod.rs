@@ -45,8 +45,10 @@
 mod build;
 #[cfg(test)]
 mod flat;
+mod grid;
 mod pairs;
 mod patches;
+mod regroup;
 #[cfg(test)]
 mod tests;
 mod topology;

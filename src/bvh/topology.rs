@@ -76,8 +76,11 @@ impl Topology {
             };
         }
         let topology = Self::clustered(boxes, effort);
-        if topology.levels() <= max_levels {
-            return topology;
+        let regrouped = topology.regrouped(boxes);
+        for topology in [regrouped, topology] {
+            if topology.levels() <= max_levels {
+                return topology;
+            }
         }
         let balanced = Self::balanced(boxes);
         assert!(
@@ -90,7 +93,7 @@ impl Topology {
     /// The tree of obvhs. It merges neighbours along a curve through space that each prefer the other; where costs
     /// tie or grow along the curve only one pair does, which takes quadratic time and ends in a chain. So boxes go in
     /// shuffled, which is the order of boxes with one centre, and disturbed, which breaks ties.
-    fn clustered(boxes: &[Aabb], effort: Effort) -> Self {
+    pub(super) fn clustered(boxes: &[Aabb], effort: Effort) -> Self {
         let mut random = SplitMix(0);
         let mut shuffle: Vec<_> = (0..boxes.len() as u32).collect();
         for last in (1..shuffle.len()).rev() {
