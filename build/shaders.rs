@@ -55,6 +55,17 @@ pub const SHADERS: &[Entry] = &[
         &["TRAVERSE_QUERY", "KERNEL_PROBE"],
         "probe_query",
     ),
+    // pixels share what their paths find
+    (
+        "kernel.comp",
+        &["TRAVERSE_SOFTWARE", "PLAIN", "SHARE"],
+        "share_software",
+    ),
+    (
+        "kernel.comp",
+        &["TRAVERSE_QUERY", "PLAIN", "SHARE"],
+        "share_query",
+    ),
     // for CPUs that gather
     (
         "kernel.comp",
@@ -80,6 +91,16 @@ pub const SHADERS: &[Entry] = &[
         "kernel.comp",
         &["TRAVERSE_SOFTWARE", "ADDRESSES", "TRACE_COUNTS"],
         "path_addresses_counts",
+    ),
+    (
+        "kernel.comp",
+        &["TRAVERSE_SOFTWARE", "ADDRESSES", "PLAIN", "SHARE"],
+        "share_software_addresses",
+    ),
+    (
+        "kernel.comp",
+        &["TRAVERSE_QUERY", "ADDRESSES", "PLAIN", "SHARE"],
+        "share_query_addresses",
     ),
     (
         "kernel.comp",

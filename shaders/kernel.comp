@@ -4,6 +4,10 @@
 #extension GL_GOOGLE_include_directive : require
 #extension GL_KHR_shader_subgroup_arithmetic : require
 #extension GL_KHR_shader_subgroup_vote : require
+#ifdef SHARE
+#extension GL_KHR_shader_subgroup_ballot : require
+#extension GL_KHR_shader_subgroup_shuffle : require
+#endif
 #ifdef TRAVERSE_SOFTWARE
 #extension GL_EXT_control_flow_attributes : require
 #endif
@@ -19,6 +23,8 @@
 #include "kernel_probe.glsl"
 #elif defined(KERNEL_REPLAY)
 #include "kernel_replay.glsl"
+#elif defined(SHARE)
+#include "kernel_share.glsl"
 #else
 #include "kernel_path.glsl"
 #endif

@@ -34,9 +34,7 @@ PathState kernel_start(uint i, uvec2 at, uint exponent)
         high = high << exponent | low >> 1u >> (31u - exponent);
         low <<= exponent;
     }
-    // Batches are aligned, so the low word does not overflow within one.
-    uvec4 key = rng_key(uvec2(params.seed_low, params.seed_high), pixel.y * params.width + pixel.x, low + i, high);
-    return path_start(key, pixel);
+    return path_start(pixels_key(pixel, low + i, high), pixel);
 }
 
 void main()

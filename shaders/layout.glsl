@@ -330,6 +330,10 @@ const uint LEDGER_DIFFERENT = 16u;
 const uint LEDGER_SIZE = 17u;
 
 const uint TILE = 8u;
+// Pixels that share what their paths find: a block of the frame, in tiles and in the order of their pixels.
+const uint SHARE_WIDTH = 4u;
+const uint SHARE_HEIGHT = 2u;
+const uint SHARE_COUNT = 8u;
 // With HAS_STRATA log₂ of the samples of a block, and of those of a whole net; see rng_key.
 const uint BLOCK_LEVEL = 4u;
 const uint NET_LEVEL = 8u;

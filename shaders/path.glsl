@@ -16,6 +16,9 @@
 #include "camera.glsl"
 #include "direct.glsl"
 #include "rng.glsl"
+#ifdef SHARE
+#include "share.glsl"
+#endif
 
 // Roulette starts after this many scattering events: short paths carry most of the light …
 const uint ROULETTE_START = 2u;
@@ -82,6 +85,16 @@ void path_leave(inout PathState path, SurfacePoint s, vec3 origin, vec3 directio
     path.lead = HAS_MEDIA ? dot(origin - s.position, direction) : 0.0;
 }
 
+// Throughput that is left when the depth limit ends the path, mean of the channels.
+float path_throughput(PathState path)
+{
+    vec3 beta = path.beta;
+#ifdef SHARE
+    beta = share_throughput(beta);
+#endif
+    return (beta.x + beta.y + beta.z) / 3.0;
+}
+
 // Roulette by throughput, which is kept at `weight` or above; false when the path ends. What is left has its weight.
 bool path_survives(inout PathState path, float weight, float u)
 {
@@ -140,7 +153,7 @@ bool path_scatter(inout PathState path, inout PathResult result, float end)
         return false;
     }
     if (is_last) {
-        result.truncated = (path.beta.x + path.beta.y + path.beta.z) / 3.0;
+        result.truncated = path_throughput(path);
         path.is_alive = false;
         return true;
     }
@@ -273,6 +286,11 @@ void path_surface(inout PathState path, inout PathResult result, SurfacePoint s,
             float pdf_light = path.can_be_sampled ? light_triangle_pdf(s, wo, dot(to, to), path_view(path)) : 0.0;
             result.radiance += path_found_weight(path, pdf_light, s.position, false) * path.scale * path.beta * s.emission;
         }
+#ifdef SHARE
+        if (path.depth == 1u) {
+            share_meet(s, bsdf, result.radiance);
+        }
+#endif
         // Inside a solid that outranks it, a boundary is not there.
         is_passed = is_solid && boundary.before == boundary.after;
     }
@@ -284,7 +302,7 @@ void path_surface(inout PathState path, inout PathResult result, SurfacePoint s,
 
     bool is_last = !path.is_sensor && path.depth >= params.max_depth;
     if (is_last && !bsdf_is_straight(bsdf)) {
-        result.truncated = (path.beta.x + path.beta.y + path.beta.z) / 3.0;
+        result.truncated = path_throughput(path);
         path.is_alive = false;
         return;
     }
@@ -311,6 +329,11 @@ void path_surface(inout PathState path, inout PathResult result, SurfacePoint s,
         return;
     }
     path.beta *= next.weight;
+#ifdef SHARE
+    if (path.depth == 0u) {
+        share_scatter(s, bsdf, path.beta, result.radiance);
+    }
+#endif
     vec3 origin = offset_origin(s.start, s.error, s.ng);
     if (HAS_DIELECTRIC && next.is_transmitted) {
         origin = far_side;
@@ -325,7 +348,7 @@ void path_surface(inout PathState path, inout PathResult result, SurfacePoint s,
         }
     }
     if (is_last) {
-        result.truncated = (path.beta.x + path.beta.y + path.beta.z) / 3.0;
+        result.truncated = path_throughput(path);
         path.is_alive = false;
         return;
     }
@@ -393,6 +416,9 @@ void path_step(inout PathState path, inout PathResult result)
             path_enter(path);
             return;
         }
+#ifdef SHARE
+        share_escape(ray.direction);
+#endif
         float pdf_light;
         vec3 radiance = environment_radiance(ray.direction, pdf_light);
         result.radiance += path_found_weight(path, pdf_light, vec3(0.0), true) * path.scale * path.beta * radiance;

@@ -4,6 +4,7 @@
 #define PIXELS_GLSL
 
 #include "invocation.glsl"
+#include "rng.glsl"
 #include "scene.glsl"
 
 layout(push_constant, scalar) uniform BatchBlock { Batch batch; };
@@ -36,6 +37,12 @@ uvec2 pixels_at(uint number)
 {
     uint tile = number / (TILE * TILE);
     return TILE * uvec2(tile % params.tiles_x, tile / params.tiles_x) + pixels_place(number % (TILE * TILE));
+}
+
+// Key of a sample's random numbers. Batches are aligned, so the low word does not overflow within one.
+uvec4 pixels_key(uvec2 pixel, uint sample_low, uint sample_high)
+{
+    return rng_key(uvec2(params.seed_low, params.seed_high), pixel.y * params.width + pixel.x, sample_low, sample_high);
 }
 
 // Adds to a counter of two words, the low one first.

@@ -287,6 +287,9 @@ tags! {
     LEDGER_DIFFERENT = 16;
     LEDGER_SIZE = 17;
     TILE = 8;
+    SHARE_WIDTH = 4;
+    SHARE_HEIGHT = 2;
+    SHARE_COUNT = 8;
     BLOCK_LEVEL = 4;
     NET_LEVEL = 8;
     BIND_PARAMS = 0;

@@ -6,7 +6,7 @@ use std::ops::Range;
 use glam::DVec3;
 
 use crate::error::{Error, Result};
-use crate::layout::BLOCK_LEVEL;
+use crate::layout::{BLOCK_LEVEL, SHARE_HEIGHT, SHARE_WIDTH};
 use crate::mutant;
 
 /// Which traversal answers "what does this ray meet?".
@@ -174,6 +174,9 @@ pub struct Settings {
     pub aovs: bool,
     /// Pixels may take different numbers of samples ([`crate::film::Allotment`]); `samples` counts those of a pixel with the fewest.
     pub adaptive: bool,
+    /// Pixels of a block share what their paths find, in scenes of opaque surfaces: less noise where light comes from other surfaces, the
+    /// same in neighbours. The expected value is the same.
+    pub share: bool,
 }
 
 impl Default for Settings {
@@ -192,6 +195,7 @@ impl Default for Settings {
             sensor: None,
             aovs: false,
             adaptive: false,
+            share: false,
         }
     }
 }
@@ -250,6 +254,16 @@ impl Settings {
                     self.width, self.height
                 ),
             );
+        }
+        if self.share && (x0 % SHARE_WIDTH != 0 || y0 % SHARE_HEIGHT != 0) {
+            let what = format!(
+                "{x0},{y0},{x1},{y1} begins within a block of pixels that share: {SHARE_WIDTH} × {SHARE_HEIGHT} from the corner of the frame"
+            );
+            return fail("--crop", what);
+        }
+        if self.share && self.adaptive {
+            let what = String::from("pixels that share take the same number of samples");
+            return fail("--adaptive", what);
         }
         if self.samples.is_empty() {
             return fail(

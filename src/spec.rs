@@ -66,6 +66,8 @@ pub struct Spec {
     pub small_records: bool,
     /// Pixels may take different numbers of samples.
     pub allotment: bool,
+    /// Pixels share what their paths find, where the scene allows it: no constant, but a kernel of its own.
+    pub share: bool,
 }
 
 /// Features that plain kernels are compiled without (`PLAIN` in `shaders/spec.glsl`): these are half as
@@ -92,6 +94,7 @@ impl Spec {
             strata: settings.block_level() > 0,
             strategy: settings.strategy,
             allotment: settings.adaptive,
+            share: settings.share,
             punctual: scene.lights.iter().any(|l| l.intensity.max_element() > 0.0),
             environment: matches!(
                 &scene.environment,
@@ -157,6 +160,7 @@ impl Spec {
             small_nodes: self.small_nodes,
             small_records: self.small_records,
             allotment: self.allotment,
+            share: self.share,
         }
     }
 
@@ -169,6 +173,11 @@ impl Spec {
     pub(crate) fn is_plain(&self) -> bool {
         let mut on = self.features().into_iter().filter(|(_, on)| *on);
         !on.any(|(name, _)| NOT_PLAIN.contains(&name))
+    }
+
+    /// Whether pixels share: that is asked for, and shadow rays tell all of what is between two surfaces.
+    pub(crate) fn shares(&self) -> bool {
+        self.share && self.is_plain() && !self.passage
     }
 
     /// Names of the features with their state, for people and files.
@@ -313,6 +322,13 @@ pub(crate) mod kernels {
     /// The same, and looks up what rays meet.
     pub(crate) const PATH_RECALL: [Kernel; 2] =
         [kernel!("path_recall"), kernel!("path_addresses_recall")];
+    /// Pixels share what their paths find; plain.
+    pub(crate) const SHARE_SOFTWARE: [Kernel; 2] = [
+        kernel!("share_software"),
+        kernel!("share_software_addresses"),
+    ];
+    pub(crate) const SHARE_QUERY: [Kernel; 2] =
+        [kernel!("share_query"), kernel!("share_query_addresses")];
     /// Traces recorded rays and shades nothing.
     pub(crate) const REPLAY_SOFTWARE: [Kernel; 2] = [
         kernel!("replay_software"),

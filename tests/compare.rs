@@ -85,6 +85,7 @@ fn drawn(random: &mut Random, law: Law, side: usize, n: u64) -> Side {
         source: Some(Source::StandardError),
         count: Some(vec![n as f64; side * side]),
         parts: None,
+        shared: [1, 1],
         rounding: 0.0,
         notes: Vec::new(),
     }
@@ -101,6 +102,47 @@ fn alarms_are_as_rare_as_they_should_be_for_any_law() {
                 p.push(compare_sides(&sides, 16, 0.05).p.unwrap());
             }
             assert_calibrated(&format!("{name}, {n} and {m} samples"), &p);
+        }
+    }
+}
+
+/// Gives all pixels of a block the values of its first one.
+fn share(side: &mut Side, width: usize, block: [usize; 2]) {
+    let first = |i: usize| {
+        let (x, y) = (i % width, i / width);
+        (y - y % block[1]) * width + x - x % block[0]
+    };
+    let all = side
+        .mean
+        .iter_mut()
+        .chain(side.variance.iter_mut().flatten());
+    for values in all {
+        *values = (0..values.len()).map(|i| values[first(i)]).collect();
+    }
+    side.shared = block;
+}
+
+/// Pixels of blocks that are wrong together: no more alarms, and too many where the files do not tell.
+#[test]
+fn alarms_are_as_rare_as_they_should_be_where_pixels_share() {
+    const WIDTH: usize = 32;
+    for (name, law) in LAWS {
+        let mut random = Random(77);
+        let (mut p, mut untold) = (Vec::new(), Vec::new());
+        for k in 0..pairs(60) {
+            let mut sides = [16, 64].map(|n| drawn(&mut random, law, WIDTH, n));
+            share(&mut sides[0], WIDTH, [4, 2]);
+            if k % 2 == 0 {
+                share(&mut sides[1], WIDTH, [4, 2]);
+            }
+            p.push(compare_sides(&sides, WIDTH, 0.05).p.unwrap());
+            sides.iter_mut().for_each(|side| side.shared = [1, 1]);
+            untold.push(compare_sides(&sides, WIDTH, 0.05).p.unwrap());
+        }
+        assert_calibrated(name, &p);
+        if name == "uniform" {
+            let alarms = untold.iter().filter(|p| **p < 0.05).count();
+            assert!(4 * alarms > untold.len(), "{alarms} without the header");
         }
     }
 }

@@ -184,6 +184,10 @@ pub struct RenderArgs {
     /// --spp on average, a quarter of it at least and four times it at most; from 64 on
     #[arg(long, conflicts_with_all = ["samples", "noise"])]
     pub adaptive: bool,
+    /// Let blocks of 4 × 2 pixels share what their paths find, where all surfaces are opaque: less noise in rooms, and
+    /// the same noise in neighbours
+    #[arg(long, conflicts_with = "adaptive")]
+    pub share: bool,
 
     /// Width of the frame in pixels [default: 1280, or from the height]
     #[arg(long, value_name = "N", value_parser = side())]

@@ -5,7 +5,8 @@ use std::ops::Range;
 use std::path::Path;
 
 use etendue::film::Film;
-use etendue::image_io::{Aov, Metadata, Value};
+use etendue::image_io::{Aov, Image, Metadata, Value};
+use etendue::layout::{SHARE_HEIGHT, SHARE_WIDTH};
 use etendue::render::Report;
 use etendue::scene::Scene;
 use etendue::settings::Settings;
@@ -74,6 +75,16 @@ impl Record<'_> {
         let features = self.report.features.iter().filter(|f| f.on);
         let features: Vec<_> = features.map(|f| f.name).collect();
         put("features", features.join(" ").into());
+        let shares = self
+            .report
+            .features
+            .iter()
+            .any(|f| f.name == "share" && f.on);
+        for (name, size) in Image::SHARE.into_iter().zip([SHARE_WIDTH, SHARE_HEIGHT]) {
+            if shares {
+                put(name, f64::from(size).into());
+            }
+        }
         put("samples", ranges(&self.film.ranges()).into());
         put("spp", count(self.film.mean_of(self.film.samples())));
         if self.job.settings.adaptive {
@@ -162,6 +173,9 @@ impl Job<'_> {
         put("estimator", settings.estimator.name().into());
         if settings.adaptive {
             put("adaptive", 1.0.into());
+        }
+        if settings.share {
+            put("share", 1.0.into());
         }
         let strategy = format!("{:?}", settings.strategy).to_lowercase();
         put("strategy", strategy.into());

@@ -18,6 +18,7 @@ pub const JOB: &[&str] = &[
     "settings.max_depth",
     "settings.estimator",
     "settings.adaptive",
+    "settings.share",
     "settings.strategy",
     "settings.camera",
     "settings.env_hash",

@@ -89,6 +89,7 @@ impl Repeat {
         }
         put("device", args.device.clone().or_else(|| setting("device")));
         words.extend(setting("adaptive").map(|_| String::from("--adaptive")));
+        words.extend(setting("share").map(|_| String::from("--share")));
         let scene = text(header, "scene").map(PathBuf::from);
         let scene = args.scene.clone().or(scene).unwrap_or_default();
         let start = ["etendue", "render", "scene", "-o", "out.exr"].map(String::from);

@@ -33,6 +33,7 @@ pub fn settings(args: &RenderArgs, scene: &Scene) -> Result<Settings> {
         estimator: args.estimator.into(),
         camera,
         adaptive: args.adaptive,
+        share: args.share,
         aovs: args.aovs().into_iter().any(Aov::needs_first_hit),
         ..Settings::default()
     };

@@ -319,6 +319,10 @@ impl<'a> Tests<'a> {
 
     fn sums(&self, pixels: &[usize], channel: usize, weights: Option<&[f64]>) -> Sums {
         let weight = |i: usize| weights.map_or(1.0, |w| w[i]);
+        let shared = self
+            .sides
+            .each_ref()
+            .map(|s| (s.shared[0] * s.shared[1]) as f64);
         // Which side's noise counts for each: the larger sum, as no side sees more than is there on average.
         let mut totals = [[0.0; 2]; 2];
         for &i in pixels {
@@ -338,13 +342,14 @@ impl<'a> Tests<'a> {
         for &i in pixels {
             let (d, rounding) = self.difference(i, channel);
             let v = self.variances(i, channel);
-            let v = v[from[0]][0] + v[from[1]][1] + d * d / self.fewest(i);
+            // Where errors of a block go together, as many sums of them are as uncertain as if all were equal.
+            let v = shared[0] * v[from[0]][0] + shared[1] * v[from[1]][1] + d * d / self.fewest(i);
             let w = weight(i);
             let v = w * w * v;
             sums.difference += w * d;
             sums.rounding += w * rounding;
             sums.variance += v;
-            sums.squares += v * v;
+            sums.squares += shared[0].max(shared[1]) * v * v;
         }
         sums
     }
@@ -378,7 +383,7 @@ impl<'a> Tests<'a> {
     }
 
     /// Weights that make a common relative difference stand out: mean over the largest variance around. They are taken from the neighbours of a pixel
-    /// and not from the pixel, whose noise is therefore independent of its weight: the weighted sum has the mean 0.
+    /// and not from the pixel, or from its block where pixels share, whose noise is therefore independent of its weight: the weighted sum has the mean 0.
     fn weights(&self, pixels: &[usize], channel: usize) -> Vec<f64> {
         let total = self.sides[0].mean[0].len();
         let (mut means, mut variances) = (vec![f64::NAN; total], vec![0.0; total]);
@@ -389,13 +394,16 @@ impl<'a> Tests<'a> {
         }
         let floor = FLOOR * variances.iter().sum::<f64>() / pixels.len() as f64;
         let (width, rows) = (self.width as isize, (total / self.width) as isize);
+        let size = [0, 1].map(|axis| self.sides[0].shared[axis].max(self.sides[1].shared[axis]));
+        let block = |i: usize| (i % self.width / size[0], i / self.width / size[1]);
         let weight = |i: usize| {
             let (x, y) = ((i % self.width) as isize, (i / self.width) as isize);
             let (mut mean, mut variance, mut count) = (0.0, 0.0, 0.0);
             for ny in (y - REACH).max(0)..=(y + REACH).min(rows - 1) {
                 for nx in (x - REACH).max(0)..=(x + REACH).min(width - 1) {
                     let n = (ny * width + nx) as usize;
-                    if n != i && !means[n].is_nan() {
+                    let is_other = block(i) != block(n);
+                    if is_other && !means[n].is_nan() {
                         mean += means[n];
                         variance = f64::max(variance, variances[n]);
                         count += 1.0;

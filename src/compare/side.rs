@@ -46,6 +46,8 @@ pub struct Side {
     pub count: Option<Vec<f64>>,
     /// Independent parts that the variance was estimated from, where the file tells; else samples are.
     pub parts: Option<f64>,
+    /// Columns and rows of the blocks of pixels whose errors go together.
+    pub shared: [usize; 2],
     /// Relative size of differences that are rounding.
     pub rounding: f64,
     /// What the user should know.
@@ -77,6 +79,7 @@ impl Side {
             mean,
             count,
             parts: image.parts(),
+            shared: image.shared(),
         };
         side.find_variance(image);
         Ok(side)

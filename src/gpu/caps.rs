@@ -1,6 +1,7 @@
 //! What a device can do: every feature and limit, asked for once. Nothing else
 //! in the crate puts questions to a driver.
 
+use ash::vk::SubgroupFeatureFlags as Operations;
 use ash::{ext, khr, vk};
 
 use super::failed;
@@ -80,6 +81,8 @@ pub struct Caps {
     pub max_storage_buffers: u32,
     /// Invocations a subgroup; 0 where the device does not say.
     pub subgroup_size: u32,
+    /// Invocations of a subgroup may read each other's values in compute shaders.
+    pub subgroup_shuffle: bool,
     /// Nanoseconds a tick of the timestamp counter.
     pub timestamp_period: f64,
     /// Sum of the device-local heaps, bytes.
@@ -118,6 +121,7 @@ struct Modern {
     scalar_block_layout: bool,
     /// Arithmetic and votes in compute shaders.
     subgroup_operations: bool,
+    subgroup_shuffle: bool,
     max_primitives: u64,
     max_instances: u64,
     scratch_alignment: u64,
@@ -188,6 +192,7 @@ impl Caps {
             max_push_bytes: limits.max_push_constants_size,
             max_storage_buffers: limits.max_per_stage_descriptor_storage_buffers,
             subgroup_size: modern.subgroup_size,
+            subgroup_shuffle: modern.subgroup_shuffle,
             timestamp_period: limits.timestamp_period.into(),
             device_bytes: memory
                 .memory_heaps_as_slice()
@@ -323,6 +328,11 @@ fn query_modern(instance: &Instance, physical: vk::PhysicalDevice, version: u32)
     } else {
         v11.max_memory_allocation_size
     };
+    let subgroups = |operations| {
+        let stages = v11.subgroup_supported_stages;
+        stages.contains(vk::ShaderStageFlags::COMPUTE)
+            && v11.subgroup_supported_operations.contains(operations)
+    };
     let driver = format!(
         "{} {}",
         text(v12.driver_name_as_c_str()),
@@ -336,12 +346,8 @@ fn query_modern(instance: &Instance, physical: vk::PhysicalDevice, version: u32)
         addresses,
         memory_budget: has(ext::memory_budget::NAME),
         scalar_block_layout: is_on(f12.scalar_block_layout),
-        subgroup_operations: v11
-            .subgroup_supported_operations
-            .contains(vk::SubgroupFeatureFlags::ARITHMETIC | vk::SubgroupFeatureFlags::VOTE)
-            && v11
-                .subgroup_supported_stages
-                .contains(vk::ShaderStageFlags::COMPUTE),
+        subgroup_operations: subgroups(Operations::ARITHMETIC | Operations::VOTE),
+        subgroup_shuffle: subgroups(Operations::BALLOT | Operations::SHUFFLE),
         max_primitives: builds.max_primitive_count,
         max_instances: builds.max_instance_count,
         scratch_alignment: builds

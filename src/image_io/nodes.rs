@@ -36,6 +36,8 @@ impl Image {
     pub const BLOCK: &'static str = "stderr.block";
     /// Entry of the header: number of independent parts that standard errors come from.
     pub const PARTS: &'static str = "stderr.parts";
+    /// Header names of the size of the blocks whose pixels share what their paths find, and are therefore wrong together.
+    pub const SHARE: [&'static str; 2] = ["share.width", "share.height"];
 
     /// Adds the nodes of the film that the image was made of.
     pub fn push_nodes(&mut self, film: &Film) {
@@ -107,6 +109,14 @@ impl Image {
             Some(Value::Number(parts)) if *parts >= 1.0 => Some(*parts),
             _ => None,
         }
+    }
+
+    /// Columns and rows of the blocks of pixels whose errors go together; 1 where each has its own.
+    pub fn shared(&self) -> [usize; 2] {
+        Self::SHARE.map(|name| match self.metadata.get(name) {
+            Some(Value::Number(n)) if *n >= 1.0 => *n as usize,
+            _ => 1,
+        })
     }
 
     /// The floats of a node, pixel by pixel.

@@ -401,9 +401,10 @@ fn next_batch(current: u32, count: u32, seconds: f64) -> u32 {
 
 fn features(spec: &crate::spec::Spec) -> Vec<Feature> {
     let planes = ("planes", spec.parallelograms + spec.triangles > 0);
+    let share = ("share", spec.shares());
     spec.features()
         .into_iter()
-        .chain([planes])
+        .chain([planes, share])
         .map(|(name, on)| Feature { name, on })
         .collect()
 }

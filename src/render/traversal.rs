@@ -199,6 +199,8 @@ impl Traversal {
             (Self::Software { .. }, Study::Replay) => kernels::REPLAY_SOFTWARE[address],
             (Self::Query { .. }, Study::Replay) => kernels::REPLAY_QUERY[address],
             (Self::Pipeline { .. }, Study::Replay) => kernels::REPLAY_PIPELINE,
+            (Self::Software { .. }, _) if spec.shares() => kernels::SHARE_SOFTWARE[address],
+            (Self::Query { .. }, _) if spec.shares() => kernels::SHARE_QUERY[address],
             (Self::Software { .. }, _) => kernels::PATH_SOFTWARE[address][plain],
             (Self::Query { .. }, _) => kernels::PATH_QUERY[address][plain],
             (Self::Pipeline { .. }, _) => kernels::PATH_PIPELINE[plain],

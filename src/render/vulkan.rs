@@ -16,8 +16,8 @@ use super::{DeviceOptions, Ledger, Memory, Study, TraversalCounts, Tuning, Works
 use crate::bvh::Bvh;
 use crate::error::{Error, Result};
 use crate::gpu::{
-    self, BindSet, BindingKind, Buffer, Device, DeviceKind, DeviceRequest, Pipeline, Resource,
-    TexelFormat, Usage,
+    self, BindSet, BindingKind, Buffer, Caps, Device, DeviceKind, DeviceRequest, Pipeline,
+    Resource, TexelFormat, Usage,
 };
 use crate::layout::{self, ProbeHit, ProbeRay, StreamRay};
 use crate::settings::BackendChoice;
@@ -96,6 +96,9 @@ impl VulkanBackend {
         tuning: &Tuning,
     ) -> Result<Self> {
         let is_cpu = device.caps().kind == DeviceKind::Cpu;
+        if data.spec.shares() {
+            check_share(device.caps(), choice)?;
+        }
         let mut params = data.params;
         let mut spec = data.spec;
         let film_bytes = film_bytes(device.caps().max_storage_range, &params, data.spec.aovs);
@@ -429,6 +432,20 @@ fn upload<T: bytemuck::Pod>(device: &Arc<Device>, name: &str, data: &[T]) -> Res
         });
     }
     Buffer::from_slice(device, name, Usage::STORAGE, data)
+}
+
+/// Whether pixels can share: those of a block are lanes of a subgroup.
+fn check_share(caps: &Caps, choice: BackendChoice) -> Result<()> {
+    let missing = match choice {
+        BackendChoice::RayPipeline => "pipelines may regroup invocations at every ray",
+        _ if !caps.subgroup_shuffle => "the device lacks shuffles in subgroups",
+        _ if caps.subgroup_size < layout::SHARE_COUNT => "subgroups of the device are too small",
+        _ => return Ok(()),
+    };
+    Err(Error::Unsupported {
+        what: String::from("--share"),
+        missing: missing.to_owned(),
+    })
 }
 
 /// Whether the processor gathers, as CPU drivers then do where shaders read by addresses.

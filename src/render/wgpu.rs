@@ -35,6 +35,12 @@ pub(super) struct WgpuBackend {
 impl WgpuBackend {
     /// On the device of these `caps`, by one of the ways through wgpu.
     pub fn new(caps: &Caps, way: BackendChoice, data: &SceneData, tuning: &Tuning) -> Result<Self> {
+        if data.spec.shares() {
+            return Err(Error::Unsupported {
+                what: String::from("--share through wgpu"),
+                missing: String::from("its kernels do not share"),
+            });
+        }
         if data.spec.allotment {
             return Err(no_allotment());
         }

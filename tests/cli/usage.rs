@@ -24,6 +24,7 @@ fn what_cannot_be_meant_is_a_usage_error() {
             "render s.gltf -o a.exr --adaptive --samples 0..64",
             "--samples",
         ),
+        ("render s.gltf -o a.exr --share --adaptive", "--adaptive"),
         ("render s.gltf -o a.exr --width 0", "--width"),
         ("render s.gltf -o a.exr --height 65537", "--height"),
         ("render s.gltf -o a.exr --crop 0,0,5", "four pixel"),

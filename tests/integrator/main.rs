@@ -31,6 +31,7 @@ mod intervals;
 mod lamps;
 mod normals;
 mod punctual;
+mod share;
 mod sky;
 mod strategies;
 

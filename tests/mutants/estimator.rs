@@ -72,6 +72,33 @@ pub const MUTANTS: &[Mutant] = &[
         ],
     },
     Mutant {
+        name: "share-unseen",
+        wrong: "what a pixel shares is seen by all of its block",
+        file: "shaders/share.glsl",
+        edits: &[(
+            "if (trace_occluded(share_near.origin, d, 0.0, distance, share_near.record, NONE)) {",
+            "if (distance < 0.0) {",
+        )],
+        killers: &["integrator::share::what_pixels_share_has_the_mean_of_each_alone"],
+    },
+    Mutant {
+        name: "share-evenly",
+        wrong: "pixels weigh what they share by their number, not by how it might have been found",
+        file: "shaders/share.glsl",
+        edits: &[(
+            "far.radiance * (density / all);",
+            "far.radiance / float(SHARE_COUNT);",
+        )],
+        killers: &["integrator::share::what_pixels_share_has_the_mean_of_each_alone"],
+    },
+    Mutant {
+        name: "share-colour",
+        wrong: "what a pixel shares has the colour of its own surface",
+        file: "shaders/share.glsl",
+        edits: &[("        beta = vec3(1.0);", "")],
+        killers: &["integrator::share::what_pixels_share_has_the_mean_of_each_alone"],
+    },
+    Mutant {
         name: "spread-itself",
         wrong: "samples of the picture tell which pixels take more",
         file: "src/settings.rs",
@@ -186,7 +213,7 @@ pub const MUTANTS: &[Mutant] = &[
         name: "sample-zero-twice",
         wrong: "the first sample is counted twice and the second never",
         file: "shaders/kernel_path.glsl",
-        edits: &[("low + i, high);", "low + (i == 1u ? 0u : i), high);")],
+        edits: &[("low + i, high)", "low + (i == 1u ? 0u : i), high)")],
         killers: &[
             "integrator::determinism::same_seed_gives_the_same_bits_however_the_work_is_cut",
         ],
@@ -195,7 +222,7 @@ pub const MUTANTS: &[Mutant] = &[
         name: "shard-seed",
         wrong: "every pass and every shard draws the same numbers",
         file: "shaders/kernel_path.glsl",
-        edits: &[("low + i, high);", "i, high);")],
+        edits: &[("low + i, high)", "i, high)")],
         killers: &[
             "integrator::determinism::same_seed_gives_the_same_bits_however_the_work_is_cut",
         ],

@@ -34,6 +34,7 @@ fn images_are_rendered_again_from_their_headers() {
         "--samples 5..12 --width 24 --height 10 --crop 3,1,9,8 --seed 18446744073709551615",
         "--spp 6 --width 16 --camera close --max-depth 2 --aov stderr,albedo --estimator textbook",
         "--spp 70 --width 16 --adaptive --aov stderr,samples --seed 3",
+        "--spp 5 --width 16 --share --crop 4,2,9,8",
         // the pilot has no time for more than a few samples
         "--spp 100000000 --width 64 --adaptive --time 0.001",
         "--spp 6 --width 16 --env sky.exr --env-intensity 0.3 --env-rotation -77.7",

@@ -83,6 +83,8 @@ pub enum WayName {
     Textbook,
     /// The full estimator, whose samples are spread over the pixels by a pilot, which counts
     Adaptive,
+    /// The full estimator, whose pixels share what their paths find
+    Shared,
 }
 
 impl WayName {
@@ -92,6 +94,7 @@ impl WayName {
             Self::Full => "full",
             Self::Textbook => "textbook",
             Self::Adaptive => "adaptive",
+            Self::Shared => "shared",
         }
     }
 
@@ -99,10 +102,11 @@ impl WayName {
     pub fn settings(self, settings: &Settings) -> Settings {
         Settings {
             estimator: match self {
-                Self::Full | Self::Adaptive => Estimator::Full,
+                Self::Full | Self::Adaptive | Self::Shared => Estimator::Full,
                 Self::Textbook => Estimator::Textbook,
             },
             adaptive: self == Self::Adaptive,
+            share: self == Self::Shared,
             ..settings.clone()
         }
     }
