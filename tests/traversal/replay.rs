@@ -54,7 +54,9 @@ fn a_replay_meets_what_the_render_met() {
         };
         assert_eq!(stream.len() as u64, rays, "{name}: not every ray is kept");
         assert!(rays > 28 * 20 * 4, "{name}: {rays} rays");
-        for addresses in [false, true] {
+        // where arrays lie is asked of two scenes
+        let texels = matches!(name, "cornell" | "lights").then_some(false);
+        for addresses in texels.into_iter().chain([true]) {
             let study = |study, stream: Option<&Stream>| {
                 let tuning = Tuning {
                     addresses: Some(addresses),
