@@ -37,6 +37,84 @@ PathState kernel_start(uint i, uvec2 at, uint exponent)
     return path_start(pixels_key(pixel, low + i, high), pixel);
 }
 
+// What an invocation has computed of its pixel, and what it is computing.
+struct KernelLane {
+    uint number;    // of the pixel, counted tile by tile
+    uvec2 at;       // in the window
+    uint exponent;  // where others take one sample, the pixel takes 2 to this power
+    uint i;         // sample that is being taken
+    uint count;     // of samples; before the first pixel all of the one before it are taken
+    bool is_first;  // nothing was taken yet
+    bool is_done;   // there are no more pixels
+    uint rays;
+    uint non_finite;
+    uint truncated;
+    uint truncated_throughput; // rounded for each sample, so that the sum is the same however samples are split
+};
+
+// Notes the sample whose path has ended, and starts the next one, of the pixel or of the next pixel.
+void kernel_next(inout KernelLane lane, inout FilmNode levels[FILM_LEVELS], inout PathState path, inout PathResult result)
+{
+    if (lane.i < lane.count) {
+        lane.rays += result.rays;
+        lane.truncated += result.truncated > 0.0 ? 1u : 0u;
+        lane.truncated_throughput += uint(result.truncated * 65536.0 + 0.5);
+        bool is_dropped = !is_finite(result.radiance);
+        lane.non_finite += is_dropped ? 1u : 0u;
+
+        FilmNode node = FilmNode(is_dropped ? vec3(0.0) : result.radiance, vec3(0.0), vec3(0.0), result.first.albedo,
+                                 result.first.normal, result.first.depth, result.first.coverage, is_dropped ? 1.0 : 0.0);
+        // A binary counter: each set bit of i is a finished sibling. The bounds
+        // are constant so that the levels stay in registers.
+        for (uint level = 0u; level < FILM_LEVELS; level++) {
+            if ((lane.i >> level & 1u) == 0u) {
+                levels[level] = node;
+                break;
+            }
+            node = film_merge(levels[level], node, level);
+        }
+        lane.i++;
+        if (lane.i == lane.count) {
+            // a power of two: the last node holds all
+            film_write(lane.at.y * params.window_width + lane.at.x - batch.film_first_pixel, node);
+            // in 32 bits for a pixel, whose samples are few
+            if (lane.truncated != 0u) {
+                atomicAdd(ledger[LEDGER_TRUNCATED], lane.truncated);
+                ledger_add(LEDGER_THROUGHPUT_LOW, lane.truncated_throughput);
+                lane.truncated = 0u;
+                lane.truncated_throughput = 0u;
+            }
+#ifdef TRACE_RECORDS
+            stream_finish(lane.number);
+#endif
+        }
+    }
+    if (lane.i == lane.count) {
+        uint k = pixels_take(lane.is_first);
+        lane.is_done = k == NONE;
+        if (lane.is_done) {
+            return;
+        }
+        lane.is_first = false;
+        lane.number = pixels_number(k);
+        lane.at = pixels_at(lane.number);
+        if (lane.at.x >= params.window_width || lane.at.y >= params.window_height) {
+            return;
+        }
+        lane.i = 0u;
+        lane.exponent = kernel_exponent(lane.at);
+        lane.count = batch.sample_count << lane.exponent;
+#if defined(TRACE_RECORDS) || defined(TRAVERSE_RECALL)
+        stream_pixel(lane.number);
+#endif
+    }
+#ifdef TRACE_RECORDS
+    stream_sample();
+#endif
+    path = kernel_start(lane.i, lane.at, lane.exponent);
+    result = path_result();
+}
+
 void main()
 {
     if (batch.sample_count == 0u) {
@@ -44,93 +122,27 @@ void main()
     }
     trace_start();
     FilmNode levels[FILM_LEVELS];
-    uint rays = 0u;
-    uint truncated = 0u;
-    // rounded for each sample, so that the sum is the same however samples are split
-    uint truncated_throughput = 0u;
-    uint non_finite = 0u;
+    KernelLane lane = KernelLane(0u, uvec2(0u), 0u, batch.sample_count, batch.sample_count, true, false, 0u, 0u, 0u, 0u);
     PathResult result;
     PathState path;
     path.is_alive = false;
     path.shadow.is_waiting = false;
-    uint number;
-    uvec2 at;
-    // Of the pixel, and of its sample that is being taken. Before the first pixel all of the one before it are.
-    uint exponent = 0u;
-    uint count = batch.sample_count;
-    uint i = count;
-    bool is_first = true;
-    // A lane whose path has ended starts its next sample at once, or waits for its subgroup: the
+    // A lane whose path has ended starts its next sample at once, or waits until the paths of all in its subgroup have: the
     // bits are the same, the host measures which is faster.
-    while (true) {
-        if (path_goes_on(path)) {
+    while (!lane.is_done) {
+        while (path_goes_on(path)) {
             path_step(path, result);
-        }
-        bool goes_on = path_goes_on(path);
-        if (batch.is_together != 0u ? invocation_any(goes_on) : goes_on) {
-            continue;
-        }
-        if (i < count) {
-            rays += result.rays;
-            truncated += result.truncated > 0.0 ? 1u : 0u;
-            truncated_throughput += uint(result.truncated * 65536.0 + 0.5);
-            bool is_dropped = !is_finite(result.radiance);
-            non_finite += is_dropped ? 1u : 0u;
-
-            FilmNode node = FilmNode(is_dropped ? vec3(0.0) : result.radiance, vec3(0.0), vec3(0.0), result.first.albedo,
-                                     result.first.normal, result.first.depth, result.first.coverage, is_dropped ? 1.0 : 0.0);
-            // A binary counter: each set bit of i is a finished sibling. The bounds
-            // are constant so that the levels stay in registers.
-            for (uint level = 0u; level < FILM_LEVELS; level++) {
-                if ((i >> level & 1u) == 0u) {
-                    levels[level] = node;
-                    break;
-                }
-                node = film_merge(levels[level], node, level);
-            }
-            i++;
-            if (i == count) {
-                // a power of two: the last node holds all
-                film_write(at.y * params.window_width + at.x - batch.film_first_pixel, node);
-                // in 32 bits for a pixel, whose samples are few
-                if (truncated != 0u) {
-                    atomicAdd(ledger[LEDGER_TRUNCATED], truncated);
-                    ledger_add(LEDGER_THROUGHPUT_LOW, truncated_throughput);
-                    truncated = 0u;
-                    truncated_throughput = 0u;
-                }
-#ifdef TRACE_RECORDS
-                stream_finish(number);
-#endif
-            }
-        }
-        if (i == count) {
-            uint k = pixels_take(is_first);
-            if (k == NONE) {
+            if (batch.is_together == 0u) {
                 break;
             }
-            is_first = false;
-            number = pixels_number(k);
-            at = pixels_at(number);
-            if (at.x >= params.window_width || at.y >= params.window_height) {
-                continue;
-            }
-            i = 0u;
-            exponent = kernel_exponent(at);
-            count = batch.sample_count << exponent;
-#if defined(TRACE_RECORDS) || defined(TRAVERSE_RECALL)
-            stream_pixel(number);
-#endif
         }
-#ifdef TRACE_RECORDS
-        stream_sample();
-#endif
-        path = kernel_start(i, at, exponent);
-        result = path_result();
+        if (!path_goes_on(path)) {
+            kernel_next(lane, levels, path, result);
+        }
     }
 
-    if (non_finite != 0u) {
-        atomicAdd(ledger[LEDGER_NON_FINITE], non_finite);
+    if (lane.non_finite != 0u) {
+        atomicAdd(ledger[LEDGER_NON_FINITE], lane.non_finite);
     }
     if (HAS_NESTED && interior_overflows != 0u) {
         atomicAdd(ledger[LEDGER_INTERIOR_OVERFLOWS], interior_overflows);
@@ -145,7 +157,7 @@ void main()
         ledger_add(LEDGER_LANES_LOW, counts.w);
     }
 #endif
-    uint rays_together = invocation_sum(rays);
+    uint rays_together = invocation_sum(lane.rays);
     if (invocation_adds()) {
         ledger_add(LEDGER_RAYS_LOW, rays_together);
     }
