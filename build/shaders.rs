@@ -66,6 +66,23 @@ pub const SHADERS: &[Entry] = &[
         &["TRAVERSE_QUERY", "PLAIN", "SHARE"],
         "share_query",
     ),
+    // traces photons
+    (
+        "kernel.comp",
+        &["TRAVERSE_SOFTWARE", "PHOTON"],
+        "photon_software",
+    ),
+    (
+        "kernel.comp",
+        &["TRAVERSE_SOFTWARE", "PLAIN", "PHOTON"],
+        "photon_software_plain",
+    ),
+    ("kernel.comp", &["TRAVERSE_QUERY", "PHOTON"], "photon_query"),
+    (
+        "kernel.comp",
+        &["TRAVERSE_QUERY", "PLAIN", "PHOTON"],
+        "photon_query_plain",
+    ),
     // for CPUs that gather
     (
         "kernel.comp",
@@ -117,6 +134,26 @@ pub const SHADERS: &[Entry] = &[
         &["TRAVERSE_QUERY", "ADDRESSES", "KERNEL_REPLAY"],
         "replay_query_addresses",
     ),
+    (
+        "kernel.comp",
+        &["TRAVERSE_SOFTWARE", "ADDRESSES", "PHOTON"],
+        "photon_software_addresses",
+    ),
+    (
+        "kernel.comp",
+        &["TRAVERSE_SOFTWARE", "ADDRESSES", "PLAIN", "PHOTON"],
+        "photon_software_addresses_plain",
+    ),
+    (
+        "kernel.comp",
+        &["TRAVERSE_QUERY", "ADDRESSES", "PHOTON"],
+        "photon_query_addresses",
+    ),
+    (
+        "kernel.comp",
+        &["TRAVERSE_QUERY", "ADDRESSES", "PLAIN", "PHOTON"],
+        "photon_query_addresses_plain",
+    ),
     // as path_software, with what wgpu lacks left out
     ("kernel.comp", &["TRAVERSE_SOFTWARE", "WGPU"], "path_wgpu"),
     (
@@ -139,6 +176,16 @@ pub const SHADERS: &[Entry] = &[
         "kernel.rgen",
         &["TRAVERSE_PIPELINE", "KERNEL_REPLAY"],
         "replay_pipeline",
+    ),
+    (
+        "kernel.rgen",
+        &["TRAVERSE_PIPELINE", "PHOTON"],
+        "photon_pipeline",
+    ),
+    (
+        "kernel.rgen",
+        &["TRAVERSE_PIPELINE", "PLAIN", "PHOTON"],
+        "photon_pipeline_plain",
     ),
     ("trace.rmiss", &[], "trace_miss"),
     ("trace.rchit", &[], "trace_closest_hit"),

@@ -21,6 +21,8 @@
 
 #ifdef KERNEL_PROBE
 #include "kernel_probe.glsl"
+#elif defined(PHOTON)
+#include "kernel_photon.glsl"
 #elif defined(KERNEL_REPLAY)
 #include "kernel_replay.glsl"
 #elif defined(SHARE)

@@ -280,6 +280,33 @@ struct ProbeHit {
     uint occluded;              // what trace_occluded says of the same ray
 };
 
+// --- Guide: where bent light comes from ---------------------------------------------
+
+// Where light may be bent: a point of a mirror or an interface.
+struct PhotonStart {
+    vec3 point;
+    float weight;               // area that it stands for, m²
+    vec3 normal;                // of the triangle, unit
+    float offset;               // metres, off the surface
+};
+
+// Where it is scattered then.
+struct Photon {
+    vec3 position;
+    float weight;               // watts, up to a common factor; 0: it did not arrive
+    vec3 direction;             // that it came from, unit
+    float direct;               // irradiance by direct light there, one sample of it
+};
+
+// A tree over positions, RGBA32UI: the root, then pairs of children, leaves between them. A node is (plane, link << GUIDE_LINK_SHIFT |
+// axis, lobes of a leaf, 0). A link is the texel of the first child, below the plane; that of a leaf, with
+// the axis GUIDE_LEAF, its box, two texels, and for each lobe (point that it aims at, κ), (weight, 0, 0, 0).
+const uint GUIDE_AXIS_MASK = 3u;
+const uint GUIDE_LEAF = 3u;
+const uint GUIDE_LINK_SHIFT = 2u;
+const uint GUIDE_DEPTH = 32u; // of the tree, at most
+const uint GUIDE_LOBES = 4u;  // of a leaf, at most
+
 // --- Stream: the rays of a render and what they met (limit report) ---------------
 
 struct StreamRay {
@@ -367,6 +394,9 @@ const uint BIND_ADDRESSES = 23u;     // uniform buffer: addresses of texel buffe
 const uint BIND_STREAM = 24u;        // texel buffer RGBA32UI: StreamRay[]; storage in the kernel that records
 const uint BIND_STREAM_STARTS = 25u; // texel buffer R32UI: where the rays of each pixel begin and, one more, where they end
 const uint BIND_STREAM_COUNTS = 26u; // storage: rays of each pixel (kernel that records)
-const uint ADDRESSES_SIZE = 26u;
+const uint BIND_GUIDE = 27u;         // texel buffer RGBA32UI: the tree, with HAS_GUIDE
+const uint BIND_PHOTON_STARTS = 28u; // storage: PhotonStart[] (photon kernel)
+const uint BIND_PHOTONS = 29u;       // storage: Photon[] (photon kernel)
+const uint ADDRESSES_SIZE = 28u;
 
 #endif

@@ -15,9 +15,17 @@
 #include "bsdf.glsl"
 #include "camera.glsl"
 #include "direct.glsl"
+#include "guide.glsl"
+#include "path_state.glsl"
 #include "rng.glsl"
 #ifdef SHARE
 #include "share.glsl"
+#endif
+#ifdef PHOTON
+#include "photon.glsl"
+const bool IS_PHOTON = true;
+#else
+const bool IS_PHOTON = false;
 #endif
 
 // Roulette starts after this many scattering events: short paths carry most of the light …
@@ -32,50 +40,6 @@ const float ROULETTE_WEIGHT_MEDIUM = 1.0;
 const uint LONG_PATH = 16384u;
 // … and few chains of mirrors and smooth interfaces, which may trap light, are as long as this.
 const uint LONG_CHAIN = 256u;
-
-// What the first hit looks like, for the feature layers.
-struct FirstHit {
-    vec3 albedo;
-    vec3 normal;
-    float depth;    // metres along the ray
-    float coverage; // 1 where something was hit
-};
-
-struct PathResult {
-    vec3 radiance;
-    FirstHit first;
-    float truncated;   // throughput that --max-depth cut off, mean of the channels
-    uint rays;
-};
-
-// A path on its way.
-struct PathState {
-    uvec4 key;             // of its random numbers
-    uint event;            // how many things the path itself has met
-    Ray ray;
-    uint from;             // record of the hit that the ray leaves, or NONE
-    float lead;            // metres along the ray that it starts ahead of the point that it leaves
-    vec3 beta;             // throughput without the factor n² of radiance
-    uint depth;            // scattering events so far
-    uint chain;            // perfectly specular ones among them since the last other
-    bool can_be_sampled;   // direct light could have found what the ray finds
-    float pdf;             // of the last scattering, per steradian
-    vec3 scattered_at;
-    vec3 scattered_normal; // as `LightView` has it
-    Interior interior;
-    float camera_ior;      // index of what surrounds the camera
-    float scale;           // radiance at the camera over radiance here: (n_camera / n)²
-    Flight flight;         // that led to the last scattering in a medium
-    bool is_alive;
-    bool is_sensor;        // at the surface of a light meter, which is no event
-    // With HAS_INSIDE: the search for the solids that hold the camera comes first.
-    bool is_search;
-    InteriorSearch search;
-    Ray camera;            // the ray of the path when the search is over
-    // With HAS_PASSAGE: direct light that is on its way, and more that waits for it.
-    Shadow shadow;
-    Shadow next_shadow;
-};
 
 // Sends the path from s on a ray that starts at `origin`, close to it.
 void path_leave(inout PathState path, SurfacePoint s, vec3 origin, vec3 direction)
@@ -98,7 +62,11 @@ float path_throughput(PathState path)
 // Roulette by throughput, which is kept at `weight` or above; false when the path ends. What is left has its weight.
 bool path_survives(inout PathState path, float weight, float u)
 {
-    float survival = path.depth >= ROULETTE_START ? min(max_component(path.beta) / weight, 1.0) : 1.0;
+    float throughput = max_component(path.beta);
+    if (HAS_GUIDE) {
+        throughput *= path.guided;
+    }
+    float survival = path.depth >= ROULETTE_START ? min(throughput / weight, 1.0) : 1.0;
     if (path.depth >= LONG_PATH) {
         survival = min(survival, 1.0 - 2.0 / float(path.depth));
     }
@@ -209,6 +177,7 @@ PathState path_start(uvec4 key, uvec2 pixel)
     path.from = NONE;
     path.lead = 0.0;
     path.beta = vec3(1.0);
+    path.guided = 1.0;
     path.depth = 0u;
     path.chain = 0u;
     path.can_be_sampled = false;
@@ -300,6 +269,12 @@ void path_surface(inout PathState path, inout PathResult result, SurfacePoint s,
         return;
     }
 
+#ifdef PHOTON
+    if (photon_meet(s, bsdf, path.ray.direction, path.beta)) {
+        path.is_alive = false;
+        return;
+    }
+#endif
     bool is_last = !path.is_sensor && path.depth >= params.max_depth;
     if (is_last && !bsdf_is_straight(bsdf)) {
         result.truncated = path_throughput(path);
@@ -307,7 +282,7 @@ void path_surface(inout PathState path, inout PathResult result, SurfacePoint s,
         return;
     }
     // Direct light. A mirror has no density that a light's sample could meet.
-    if (HAS_LIGHTS && !is_last && bsdf_has_density(bsdf)) {
+    if (HAS_LIGHTS && !IS_PHOTON && !is_last && bsdf_has_density(bsdf)) {
         DirectLight direct = direct_on_surface(s, bsdf, frame, wo_local, path.key, path.event, path.depth == 0u);
         if (!(direct.value.x + direct.value.y + direct.value.z <= 0.0)) {
             bool is_beyond = HAS_DIELECTRIC && dot(direct.light.wi, s.ng) < 0.0;
@@ -324,6 +299,13 @@ void path_surface(inout PathState path, inout PathResult result, SurfacePoint s,
 
     vec4 u = rng_uniform(path.key, path.event, SLOT_BSDF);
     BsdfSample next = bsdf_sample(bsdf, wo_local, u.xyz);
+    if (HAS_GUIDE && bsdf_has_density(bsdf)) {
+        vec4 u_guide = rng_uniform(path.key, path.event, SLOT_GUIDE);
+        path.guided *= guide_sample(s.position, bsdf, frame, wo_local, u.x, u_guide, next);
+    }
+#ifdef PHOTON
+    next.is_valid = next.is_valid && photon_leave(next);
+#endif
     if (!next.is_valid) {
         path.is_alive = false;
         return;
@@ -364,16 +346,6 @@ void path_surface(inout PathState path, inout PathResult result, SurfacePoint s,
     path.scattered_at = s.position;
     path.scattered_normal = direct_normal(s, bsdf);
     path.flight.pdf = 0.0;
-}
-
-PathResult path_result()
-{
-    PathResult result;
-    result.radiance = vec3(0.0);
-    result.first = FirstHit(vec3(0.0), vec3(0.0), 0.0, 0.0);
-    result.truncated = 0.0;
-    result.rays = 0u;
-    return result;
 }
 
 // Traces one ray of the path, of direct light or of the search for solids that hold

@@ -24,6 +24,7 @@ const uint SLOT_COVER = 2u;  // x: partial coverage
 const uint SLOT_MEDIUM = 3u; // x: channel, y: distance, z: distance by the light
 const uint SLOT_SEGMENT = 4u; // as SLOT_LIGHT, for light along a segment
 const uint SLOT_CANDIDATE = 5u; // which sample of a light is followed
+const uint SLOT_GUIDE = 6u;  // x: whether the guide chooses, and its lobe, yz: direction
 const uint SLOT_COUNT = 8u;
 
 uvec4 rng_pcg4d(uvec4 v)

@@ -49,6 +49,7 @@ uint scene_single(uint binding, int i) { return Single(scene_address(binding, i,
 #define env_map(i) uintBitsToFloat(scene_quad(BIND_ENV_MAP, i))
 #define env_table(i) scene_pair(BIND_ENV_TABLE, i)
 #define media(i) scene_quad(BIND_MEDIA, i)
+#define guide_texels(i) scene_quad(BIND_GUIDE, i)
 #else
 layout(binding = BIND_INSTANCES) uniform usamplerBuffer instances;
 layout(binding = BIND_TRIANGLES) uniform usamplerBuffer triangles;
@@ -61,6 +62,7 @@ layout(binding = BIND_LIGHTS) uniform usamplerBuffer lights;
 layout(binding = BIND_ENV_MAP) uniform samplerBuffer env_map;
 layout(binding = BIND_ENV_TABLE) uniform usamplerBuffer env_table;
 layout(binding = BIND_MEDIA) uniform usamplerBuffer media;
+layout(binding = BIND_GUIDE) uniform usamplerBuffer guide_texels;
 #endif
 
 // Where a group is placed; groups of words that are not used cost nothing.

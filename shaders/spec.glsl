@@ -46,6 +46,11 @@ layout(constant_id = 25) const bool HAS_BOXES = false; // the device's structure
 layout(constant_id = 26) const bool HAS_SMALL_NODES = false;   // of the own tree: all nodes fit a uniform buffer
 layout(constant_id = 27) const bool HAS_SMALL_RECORDS = false; // so do its records
 layout(constant_id = 28) const bool HAS_ALLOTMENT = false; // pixels take different numbers of samples
+#ifdef WGPU
+const bool HAS_GUIDE = false;
+#else
+layout(constant_id = 29) const bool HAS_GUIDE = true;      // photons tell where bent light comes from
+#endif
 
 // Traversals ask surface_is_opaque of triangles that are marked.
 const bool HAS_CANDIDATES = HAS_ALPHA || HAS_NESTED;

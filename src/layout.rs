@@ -191,6 +191,18 @@ shared! {
         record: u32,
         occluded: u32,
     }
+    PhotonStart {
+        point: [f32; 3],
+        weight: f32,
+        normal: [f32; 3],
+        offset: f32,
+    }
+    Photon {
+        position: [f32; 3],
+        weight: f32,
+        direction: [f32; 3],
+        direct: f32,
+    }
     StreamRay {
         origin: [f32; 3],
         t_max: f32,
@@ -267,6 +279,11 @@ tags! {
     LIGHT_PLAIN = 0x80000000;
     LIGHT_DOUBLE_SIDED = 0x40000000;
     LIGHT_MIRRORED = 0x20000000;
+    GUIDE_AXIS_MASK = 3;
+    GUIDE_LEAF = 3;
+    GUIDE_LINK_SHIFT = 2;
+    GUIDE_DEPTH = 32;
+    GUIDE_LOBES = 4;
     STREAM_RAY_TEXELS = 4;
     STREAM_IS_FIRST = 1;
     STREAM_IS_SHADOW = 2;
@@ -319,5 +336,8 @@ tags! {
     BIND_STREAM = 24;
     BIND_STREAM_STARTS = 25;
     BIND_STREAM_COUNTS = 26;
-    ADDRESSES_SIZE = 26;
+    BIND_GUIDE = 27;
+    BIND_PHOTON_STARTS = 28;
+    BIND_PHOTONS = 29;
+    ADDRESSES_SIZE = 28;
 }

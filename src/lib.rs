@@ -10,6 +10,7 @@ pub mod error;
 pub mod fault;
 pub mod film;
 pub mod gpu;
+mod guide;
 pub mod image_io;
 pub mod layout;
 mod mutant;

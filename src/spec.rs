@@ -3,7 +3,7 @@
 //! no instruction behind.
 
 use crate::scene::{AlphaMode, Material, Scene};
-use crate::settings::{Settings, Strategy};
+use crate::settings::{Estimator, Settings, Strategy};
 
 /// The features in the order of their constants' ids.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -66,6 +66,8 @@ pub struct Spec {
     pub small_records: bool,
     /// Pixels may take different numbers of samples.
     pub allotment: bool,
+    /// Photons tell where light comes from that mirrors and interfaces have bent, where any of it arrives.
+    pub guide: bool,
     /// Pixels share what their paths find, where the scene allows it: no constant, but a kernel of its own.
     pub share: bool,
 }
@@ -125,6 +127,11 @@ impl Spec {
             spec.media |= !outside.is_clear();
             spec.scattering |= outside.scattering != glam::Vec3::ZERO;
         }
+        spec.guide = spec.specular
+            && !spec.scattering
+            && !spec.shares()
+            && settings.estimator == Estimator::Full
+            && settings.strategy == Strategy::Mis;
         spec
     }
 
@@ -160,6 +167,7 @@ impl Spec {
             small_nodes: self.small_nodes,
             small_records: self.small_records,
             allotment: self.allotment,
+            guide: self.guide,
             share: self.share,
         }
     }
@@ -222,7 +230,7 @@ impl Spec {
                     .chain([strategy, self.parallelograms, self.triangles])
                     .chain([self.texture_kinds])
                     .chain([self.boxes, self.small_nodes, self.small_records].map(u32::from))
-                    .chain([u32::from(self.allotment)]),
+                    .chain([self.allotment, self.guide].map(u32::from)),
             )
             .collect()
     }
@@ -343,6 +351,23 @@ pub(crate) mod kernels {
     pub(crate) const PATH_WGPU: Kernel = kernel!("path_wgpu");
     #[cfg(feature = "wgpu")]
     pub(crate) const PATH_WGPU_QUERY: Kernel = kernel!("path_wgpu_query");
+    /// Traces photons.
+    pub(crate) const PHOTON_SOFTWARE: [[Kernel; 2]; 2] = [
+        [kernel!("photon_software"), kernel!("photon_software_plain")],
+        [
+            kernel!("photon_software_addresses"),
+            kernel!("photon_software_addresses_plain"),
+        ],
+    ];
+    pub(crate) const PHOTON_QUERY: [[Kernel; 2]; 2] = [
+        [kernel!("photon_query"), kernel!("photon_query_plain")],
+        [
+            kernel!("photon_query_addresses"),
+            kernel!("photon_query_addresses_plain"),
+        ],
+    ];
+    pub(crate) const PHOTON_PIPELINE: [Kernel; 2] =
+        [kernel!("photon_pipeline"), kernel!("photon_pipeline_plain")];
     pub(crate) const PATH_PIPELINE: [Kernel; 2] =
         [kernel!("path_pipeline"), kernel!("path_pipeline_plain")];
     pub(crate) const PROBE_PIPELINE: Kernel = kernel!("probe_pipeline");

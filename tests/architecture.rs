@@ -16,6 +16,7 @@ const MAY_USE: &[(&str, &[&str])] = &[
     ("fault", &[]),
     ("gpu", &["error", "fault"]),
     ("bvh", &["error"]),
+    ("guide", &["layout"]),
     ("chart", &[]),
     ("settings", &["error", "layout", "mutant"]),
     ("mutant", &[]),
@@ -37,8 +38,8 @@ const MAY_USE: &[(&str, &[&str])] = &[
     (
         "render",
         &[
-            "bvh", "error", "fault", "film", "gpu", "layout", "mutant", "scene", "settings",
-            "spec", "store", "wgpu",
+            "bvh", "error", "fault", "film", "gpu", "guide", "layout", "mutant", "scene",
+            "settings", "spec", "store", "wgpu",
         ],
     ),
 ];

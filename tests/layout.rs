@@ -19,7 +19,7 @@ use etendue::spec::Spec;
 use spirv::Module;
 
 /// The kernels that render and probe; test kernels have bindings of their own.
-const KERNELS: [&str; 9] = [
+const KERNELS: [&str; 10] = [
     "path_software",
     "path_query",
     "path_pipeline",
@@ -28,6 +28,7 @@ const KERNELS: [&str; 9] = [
     "probe_pipeline",
     "path_record",
     "replay_software",
+    "photon_software",
     "trace_any_hit",
 ];
 
@@ -113,6 +114,7 @@ fn specialisation_constants_are_the_same_in_rust_and_glsl() {
             "HAS_SMALL_NODES",
             "HAS_SMALL_RECORDS",
             "HAS_ALLOTMENT",
+            "HAS_GUIDE",
         ]
         .map(String::from),
     );

@@ -20,6 +20,8 @@ layout(binding = 7, scalar) buffer Probe07 { ProbeRay probe_rays[]; };
 layout(binding = 8, scalar) buffer Probe08 { ProbeHit probe_hits[]; };
 layout(binding = 9, scalar) buffer Probe09 { Medium media[]; };
 layout(binding = 10, scalar) buffer Probe10 { Plane planes[]; };
-layout(binding = 11, scalar) buffer Probe11 { StreamRay stream[]; };
+layout(binding = 11, scalar) buffer Probe11 { PhotonStart photon_starts[]; };
+layout(binding = 12, scalar) buffer Probe12 { Photon photons[]; };
+layout(binding = 13, scalar) buffer Probe13 { StreamRay stream[]; };
 
 void main() {}

@@ -17,6 +17,7 @@ mod media;
 mod meter;
 mod pace;
 mod passes;
+mod photons;
 mod planes;
 mod report;
 mod room;
@@ -404,7 +405,7 @@ fn features(spec: &crate::spec::Spec) -> Vec<Feature> {
     let share = ("share", spec.shares());
     spec.features()
         .into_iter()
-        .chain([planes, share])
+        .chain([planes, share, ("guide", spec.guide)])
         .map(|(name, on)| Feature { name, on })
         .collect()
 }

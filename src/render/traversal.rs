@@ -208,6 +208,23 @@ impl Traversal {
         self.pipeline(device, "path", kernel, spec, bindings)
     }
 
+    /// Compiles the kernel that traces photons.
+    pub fn photon_pipeline(
+        &self,
+        device: &Arc<Device>,
+        spec: &Spec,
+        bindings: &[(u32, BindingKind)],
+        by_address: bool,
+    ) -> Result<Pipeline> {
+        let (address, plain) = (usize::from(by_address), usize::from(spec.is_plain()));
+        let kernel = match self {
+            Self::Software { .. } => kernels::PHOTON_SOFTWARE[address][plain],
+            Self::Query { .. } => kernels::PHOTON_QUERY[address][plain],
+            Self::Pipeline { .. } => kernels::PHOTON_PIPELINE[plain],
+        };
+        self.pipeline(device, "photons", kernel, spec, bindings)
+    }
+
     /// Compiles the kernel that answers given rays.
     pub fn probe_pipeline(
         &self,

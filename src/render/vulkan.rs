@@ -7,6 +7,7 @@ use std::sync::Arc;
 use bytemuck::cast_slice;
 
 use super::backend::{Backend, Batch, Frame, film_bytes, film_floats, read_ledger};
+use super::photons;
 use super::planes::Planes;
 use super::room;
 use super::stream::{self, Stream};
@@ -176,6 +177,7 @@ impl VulkanBackend {
             input(layout::BIND_ENV_MAP, "environment map", float, cast_slice(&data.env_map))?,
             input(layout::BIND_ENV_TABLE, "environment table", pair, cast_slice(&data.env_table))?,
             input(layout::BIND_MEDIA, "media", RECORDS, cast_slice(&data.media))?,
+            input(layout::BIND_GUIDE, "guide", RECORDS, cast_slice(&[[0u32; 4]]))?,
             input(layout::BIND_ALLOTMENT, "allotment", word, cast_slice(&allotment))?,
         ]);
         if tuning.study.has_stream() {
@@ -186,6 +188,15 @@ impl VulkanBackend {
             let table = addresses(&shared, &traversal);
             let buffer = Buffer::from_slice(device, "addresses", Usage::UNIFORM, &table)?;
             shared.push((layout::BIND_ADDRESSES, BindingKind::Uniform, buffer));
+        }
+        if std::mem::take(&mut spec.guide) {
+            if let Some(guide) =
+                photons::guide(device, &traversal, &spec, &shared, data, by_address)?
+            {
+                spec.guide = true;
+                let guide = input(layout::BIND_GUIDE, "guide", RECORDS, cast_slice(&guide))?;
+                replace(&mut shared, &traversal, [guide])?;
+            }
         }
 
         let film = Buffer::new(
@@ -229,14 +240,27 @@ impl VulkanBackend {
 }
 
 impl VulkanBackend {
-    fn find(&self, binding: u32) -> Option<&Buffer> {
-        let mut inputs = self.shared.iter();
-        let input = inputs.find(|(at, _, _)| *at == binding);
-        input.map(|(_, _, buffer)| buffer)
-    }
-
     fn shared(&self, binding: u32) -> &Buffer {
-        self.find(binding).expect("the kernel has it")
+        find(&self.shared, binding).expect("the kernel has it")
+    }
+}
+
+fn find(shared: &[Input], binding: u32) -> Option<&Buffer> {
+    let input = shared.iter().find(|(at, _, _)| *at == binding);
+    input.map(|(_, _, buffer)| buffer)
+}
+
+/// Puts others in the place of some inputs.
+fn replace<const N: usize>(
+    shared: &mut Vec<Input>,
+    traversal: &Traversal,
+    inputs: [Input; N],
+) -> Result<()> {
+    shared.retain(|(at, ..)| inputs.iter().all(|input| input.0 != *at));
+    shared.extend(inputs);
+    match find(shared, layout::BIND_ADDRESSES) {
+        Some(table) => table.write(0, &addresses(shared, traversal)),
+        None => Ok(()),
     }
 }
 
@@ -313,18 +337,12 @@ impl Backend for VulkanBackend {
     }
 
     fn hold(&mut self, stream: &Stream) -> Result<()> {
-        let table = self.find(layout::BIND_ADDRESSES).cloned();
-        let usage = match table {
+        let usage = match find(&self.shared, layout::BIND_ADDRESSES) {
             Some(_) => Usage::ADDRESS,
             None => Usage::default(),
         };
         let inputs = stream::inputs(&self.device, stream, self.study, usage)?;
-        self.shared
-            .retain(|(at, ..)| inputs.iter().all(|input| input.0 != *at));
-        self.shared.extend(inputs);
-        if let Some(table) = table {
-            table.write(0, &addresses(&self.shared, &self.traversal))?;
-        }
+        replace(&mut self.shared, &self.traversal, inputs)?;
         let others = [
             (layout::BIND_FILM, &self.film),
             (layout::BIND_LEDGER, &self.ledger),
@@ -406,7 +424,7 @@ fn addresses(shared: &[Input], traversal: &Traversal) -> [u64; layout::ADDRESSES
 }
 
 /// What a kernel reads and writes.
-fn bind(
+pub(super) fn bind(
     pipeline: &Pipeline,
     name: &str,
     shared: &[Input],
@@ -420,7 +438,11 @@ fn bind(
     BindSet::new(pipeline, name, &resources)
 }
 
-fn upload<T: bytemuck::Pod>(device: &Arc<Device>, name: &str, data: &[T]) -> Result<Buffer> {
+pub(super) fn upload<T: bytemuck::Pod>(
+    device: &Arc<Device>,
+    name: &str,
+    data: &[T],
+) -> Result<Buffer> {
     let bytes = size_of_val(data) as u64;
     if bytes > device.caps().max_storage_range {
         return Err(Error::Unsupported {

@@ -48,6 +48,8 @@ impl WgpuBackend {
         let is_cpu = caps.kind == DeviceKind::Cpu;
         let mut params = data.params;
         let mut spec = data.spec;
+        // no kernel traces photons
+        spec.guide = false;
         let mut instances = data.instances.clone();
         let (bvh, scene) = if way == BackendChoice::WgpuRayQuery {
             spec.boxes = tuning.boxes.unwrap_or(is_cpu);

@@ -27,6 +27,7 @@ mod determinism;
 mod emission;
 mod features;
 mod furnace;
+mod guide;
 mod intervals;
 mod lamps;
 mod normals;

@@ -57,7 +57,7 @@ pub const MUTANTS: &[Mutant] = &[
         wrong: "survival is the square of the throughput",
         file: "shaders/path.glsl",
         edits: &[(
-            "min(max_component(path.beta) / weight, 1.0) : 1.0;",
+            "min(throughput / weight, 1.0) : 1.0;",
             "square(min(max_component(path.beta), 1.0)) : 1.0;",
         )],
         killers: &["integrator::closed::closed_room_sums_the_series"],
@@ -97,6 +97,46 @@ pub const MUTANTS: &[Mutant] = &[
         file: "shaders/share.glsl",
         edits: &[("        beta = vec3(1.0);", "")],
         killers: &["integrator::share::what_pixels_share_has_the_mean_of_each_alone"],
+    },
+    Mutant {
+        name: "guide-density",
+        wrong: "directions of the guide have the density that the surface would have given them",
+        file: "shaders/guide.glsl",
+        edits: &[(
+            "    next.weight = value.f_cos / pdf;",
+            "    next.weight = value.f_cos / value.pdf;",
+        )],
+        killers: &["integrator::guide::a_mirrored_lamp_is_as_bright_as_two"],
+    },
+    Mutant {
+        name: "guide-all",
+        wrong: "what the guide takes is not missing from the surface's own directions",
+        file: "shaders/guide.glsl",
+        edits: &[(
+            "(guide_pdf(guide, frame * next.wi) - next.wi.z * INV_PI);",
+            "guide_pdf(guide, frame * next.wi);",
+        )],
+        killers: &["integrator::guide::guided_paths_have_the_mean_of_plain_ones"],
+    },
+    Mutant {
+        name: "guide-evenly",
+        wrong: "all lobes weigh the same, and are not chosen alike",
+        file: "shaders/guide.glsl",
+        edits: &[(
+            "sum += lobe.weight * lobe.kappa *",
+            "sum += (guide.total / float(GUIDE_LOBES)) * lobe.kappa *",
+        )],
+        killers: &["integrator::guide::a_mirrored_lamp_is_as_bright_as_two"],
+    },
+    Mutant {
+        name: "guide-wide",
+        wrong: "lobes are half as dense as their directions",
+        file: "shaders/guide.glsl",
+        edits: &[(
+            "return sum / (TWO_PI * guide.total);",
+            "return sum / (2.0 * TWO_PI * guide.total);",
+        )],
+        killers: &["integrator::guide::a_mirrored_lamp_is_as_bright_as_two"],
     },
     Mutant {
         name: "spread-itself",
