@@ -185,7 +185,7 @@ fn the_report_compares_at_equal_error() {
     assert!(html.contains(row), "{html}");
     assert!(html.contains("not compared: mean off by 25 ± 0.1 %"));
     // at its best, with what comes before the first sample: (20 + 3 · 16)/(18 + 16)
-    let best = "| other 1.0 | a <scene> | fast | 3 | 3 to 3 | 2 |";
+    let best = "| other 1.0 | a <scene> | fast | 3 | 3 to 3 | 3 (3 to 3) | 2 |";
     let tables = fs::read_to_string(folder.path().join("r.md")).unwrap();
     assert!(tables.contains(best), "{tables}");
     assert!(!html.contains("<scene>"));

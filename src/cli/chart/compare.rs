@@ -1,18 +1,21 @@
 //! Time to equal error: how many times as fast one contender is as another.
 
 use super::super::bench::record::{Agreement, Line, Run};
+use super::estimate::Estimate;
 use super::panels::runs;
 use super::{distinct, quantile};
 
-/// How many times as long another contender takes for the error that both reach.
+/// What another contender needs, as a multiple of what the base does.
 #[derive(Clone, Copy)]
 pub struct Ratio {
-    /// Median over the seeds' pairs of curves.
-    pub median: f64,
-    /// Least and greatest of them.
-    pub range: (f64, f64),
-    /// Median with everything before the first sample on both sides: start of the process, building, compiling.
+    /// Time to the relMSE that both reach, in the mean over the seeds.
+    pub time: Estimate,
+    /// The same with everything before the first sample on both sides: start of the process, building, compiling.
     pub with_start: Option<f64>,
+    /// The same for the errors of one seed at a time: median, least and greatest.
+    pub seeds: [f64; 3],
+    /// Squared error × time with the most samples.
+    pub work: Estimate,
 }
 
 /// Contenders compared with `base` on every scene: (scene, contender, ratio).
@@ -24,42 +27,18 @@ pub fn ratios(lines: &[Line], base: &str) -> Vec<(String, String, Ratio)> {
             if other == base || disagrees(lines, scene, other).is_some() {
                 continue;
             }
-            let of = |name: &str, seed: u64| -> Vec<(f64, f64)> {
-                let own = runs
-                    .iter()
-                    .filter(|r| r.scene == scene && r.contender == name && r.seed == seed);
-                own.map(|r| (r.seconds, r.relmse)).collect()
+            let of = |name: &str| -> Vec<&Run> {
+                let all = runs.iter().copied();
+                all.filter(|r| r.scene == scene && r.contender == name)
+                    .collect()
             };
-            let seeds = distinct(runs.iter().map(|r: &&Run| r.seed));
-            let each = seeds.into_iter().filter_map(|seed| {
-                let (a, b) = (of(base, seed), of(other, seed));
-                times(&a, &b)
-            });
-            let each: Vec<(f64, f64)> = each.collect();
-            if !each.is_empty() {
-                let starts = before(lines, scene, base).zip(before(lines, scene, other));
-                found.push((scene.to_owned(), other.to_owned(), summary(&each, starts)));
+            let starts = before(lines, scene, base).zip(before(lines, scene, other));
+            if let Some(ratio) = ratio(&of(base), &of(other), starts) {
+                found.push((scene.to_owned(), other.to_owned(), ratio));
             }
         }
     }
     found
-}
-
-/// Geometric means: of (name, ratio) the name, how many there are, and the mean.
-pub fn means<'a>(
-    ratios: impl Iterator<Item = (&'a str, f64)> + Clone,
-) -> Vec<(&'a str, usize, f64)> {
-    let names = distinct(ratios.clone().map(|r| r.0));
-    let mean = |name| {
-        let logs: Vec<f64> = ratios
-            .clone()
-            .filter(|r| r.0 == name)
-            .map(|r| r.1.ln())
-            .collect();
-        let mean = (logs.iter().sum::<f64>() / logs.len() as f64).exp();
-        (name, logs.len(), mean)
-    };
-    names.into_iter().map(mean).collect()
 }
 
 /// The agreement line of a peer whose pictures are not ours.
@@ -91,7 +70,7 @@ pub fn best(
             continue;
         }
         match found.iter_mut().find(|f| f.0 == *scene && f.1 == peer) {
-            Some(other) if other.3.median <= ratio.median => {}
+            Some(other) if other.3.time.value() <= ratio.time.value() => {}
             Some(other) => (other.2, other.3) = (contender.clone(), *ratio),
             None => found.push((scene.clone(), peer.to_owned(), contender.clone(), *ratio)),
         }
@@ -109,15 +88,47 @@ fn before(lines: &[Line], scene: &str, contender: &str) -> Option<f64> {
     })
 }
 
-/// Of pairs (base, other) of seconds to one error; `starts` are the seconds before.
-fn summary(each: &[(f64, f64)], starts: Option<(f64, f64)>) -> Ratio {
-    let of = |(a, b): (f64, f64)| each.iter().map(|t| (t.1 + b) / (t.0 + a)).collect();
-    let plain: Vec<f64> = of((0.0, 0.0));
-    Ratio {
-        median: quantile(&plain, 0.5),
-        range: (quantile(&plain, 0.0), quantile(&plain, 1.0)),
-        with_start: starts.map(|s| quantile(&of(s), 0.5)),
-    }
+/// Of the runs of two contenders on one scene; `starts` are the seconds before. None without a seed that both have.
+fn ratio(base: &[&Run], other: &[&Run], starts: Option<(f64, f64)>) -> Option<Ratio> {
+    let has = |runs: &[&Run], seed| runs.iter().any(|r| r.seed == seed);
+    let mut seeds = distinct(base.iter().map(|r| r.seed));
+    seeds.retain(|seed| has(other, *seed));
+    let both = |some: &[u64]| times(&curve(base, some), &curve(other, some));
+    let (a, b) = both(&seeds)?;
+    let each = seeds.iter().filter_map(|seed| both(&[*seed]));
+    let each: Vec<f64> = each.map(|(a, b)| b / a).collect();
+    Some(Ratio {
+        time: Estimate::new(&seeds, |some| both(some).map(|(a, b)| b / a))?,
+        with_start: starts.map(|s| (b + s.1) / (a + s.0)),
+        seeds: [0.5, 0.0, 1.0].map(|share| quantile(&each, share)),
+        work: Estimate::new(&seeds, |some| Some(work(other, some) / work(base, some)))?,
+    })
+}
+
+/// (seconds, relMSE) with each number of samples: the median of the seconds, which other work on the machine
+/// disturbs at times, and the mean of the errors, which is what relMSE estimates.
+fn curve(runs: &[&Run], seeds: &[u64]) -> Vec<(f64, f64)> {
+    let levels = distinct(runs.iter().map(|r| r.spp)).into_iter();
+    levels
+        .map(|spp| level(runs, seeds, spp, |r| r.relmse))
+        .collect()
+}
+
+/// Squared error × time with the most samples.
+fn work(runs: &[&Run], seeds: &[u64]) -> f64 {
+    let most = runs.iter().map(|r| r.spp).max().unwrap_or(0);
+    let (seconds, square) = level(runs, seeds, most, |r| r.rmse * r.rmse);
+    seconds * square
+}
+
+/// Median of the seconds and mean of the errors of the runs with so many samples.
+fn level(runs: &[&Run], seeds: &[u64], spp: u64, error: fn(&Run) -> f64) -> (f64, f64) {
+    let own = runs
+        .iter()
+        .filter(|r| r.spp == spp && seeds.contains(&r.seed));
+    let seconds: Vec<f64> = own.clone().map(|r| r.seconds).collect();
+    let errors: f64 = own.map(|r| error(r)).sum();
+    (quantile(&seconds, 0.5), errors / seconds.len() as f64)
 }
 
 /// Seconds of `base` and of `other` to the larger of their last errors. Curves are (seconds, relMSE).
@@ -144,30 +155,69 @@ fn time(curve: &[(f64, f64)], target: f64) -> Option<f64> {
 mod tests {
     use super::*;
 
-    fn ratio(base: &[(f64, f64)], other: &[(f64, f64)]) -> Option<f64> {
-        times(base, other).map(|(a, b)| b / a)
+    fn run(spp: u64, seed: u64, seconds: f64, relmse: f64) -> Run {
+        Run {
+            scene: String::from("s"),
+            contender: String::from("c"),
+            spp,
+            seed,
+            seconds,
+            paths_per_second: 0.0,
+            rays_per_second: None,
+            rmse: relmse.sqrt(),
+            relmse,
+            relmse_trimmed: relmse,
+            mean: [0.0; 3],
+        }
+    }
+
+    fn compared(base: &[Run], other: &[Run], starts: Option<(f64, f64)>) -> Ratio {
+        let (base, other): (Vec<_>, Vec<_>) = (base.iter().collect(), other.iter().collect());
+        ratio(&base, &other, starts).unwrap()
     }
 
     #[test]
     fn what_comes_before_counts_where_it_is_asked_for() {
-        let each = [(1.0, 4.0), (1.0, 3.0), (1.0, 2.0)];
-        let ratio = summary(&each, Some((0.5, 6.0)));
-        assert_eq!((ratio.median, ratio.range), (3.0, (2.0, 4.0)));
-        assert_eq!(ratio.with_start, Some(6.0));
-        assert_eq!(summary(&each, None).with_start, None);
+        let of = |seconds: f64| -> Vec<Run> { (1..4).map(|s| run(1, s, seconds, 0.1)).collect() };
+        let with = compared(&of(1.0), &of(3.0), Some((0.5, 6.0)));
+        assert!((with.time.value() - 3.0).abs() < 1e-12);
+        assert_eq!(with.with_start, Some(6.0));
+        assert_eq!(compared(&of(1.0), &of(3.0), None).with_start, None);
     }
 
     #[test]
     fn a_contender_twice_as_fast_is_twice_as_fast() {
         let slow: Vec<(f64, f64)> = (0..5).map(|i| (2f64.powi(i), 2f64.powi(-i))).collect();
         let fast: Vec<(f64, f64)> = slow.iter().map(|(t, e)| (t / 2.0, *e)).collect();
-        assert!((ratio(&fast, &slow).unwrap() - 2.0).abs() < 1e-12);
-        assert!((ratio(&slow, &fast).unwrap() - 0.5).abs() < 1e-12);
+        let ratio = |base, other| times(base, other).map(|(a, b)| b / a).unwrap();
+        assert!((ratio(&fast, &slow) - 2.0).abs() < 1e-12);
+        assert!((ratio(&slow, &fast) - 0.5).abs() < 1e-12);
         // the same, with samples that reach elsewhere
-        assert!((ratio(&fast[..3], &slow[1..]).unwrap() - 2.0).abs() < 1e-12);
+        assert!((ratio(&fast[..3], &slow[1..]) - 2.0).abs() < 1e-12);
         // even one sample is better than all that the other reaches
         let good = [(1.0, 1e-3), (2.0, 5e-4)];
-        let ratio = ratio(&good, &slow).unwrap();
-        assert!((ratio - 16.0 / (1e-3 * 16.0)).abs() < 1e-9, "{ratio}");
+        assert!((ratio(&good, &slow) - 16.0 / (1e-3 * 16.0)).abs() < 1e-9);
+    }
+
+    #[test]
+    fn a_rare_bright_sample_counts_in_the_mean_and_not_in_the_median() {
+        // one seed of five has a hundred times the error of the others: 0.01 becomes 0.208 in the mean
+        let lucky = |seed: u64| if seed == 3 { 1.0 } else { 0.01 };
+        let rare: Vec<Run> = (1..6).map(|s| run(8, s, 1.0, lucky(s))).collect();
+        let even: Vec<Run> = (1..6).map(|s| run(8, s, 1.0, 0.01)).collect();
+        let ratio = compared(&even, &rare, None);
+        assert!((ratio.time.value() - 20.8).abs() < 1e-9);
+        assert!((ratio.work.value() - 20.8).abs() < 1e-9);
+        assert!((ratio.seeds[0] - 1.0).abs() < 1e-9);
+        assert!((ratio.seeds[2] - 100.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn seeds_that_one_of_them_lacks_are_left_out() {
+        let base: Vec<Run> = (1..4).map(|s| run(1, s, 1.0, 0.1)).collect();
+        let other = [run(1, 2, 2.0, 0.1), run(1, 9, 50.0, 7.0)];
+        let ratio = compared(&base, &other, None);
+        assert!((ratio.time.value() - 2.0).abs() < 1e-12);
+        assert_eq!(ratio.time.interval(), "");
     }
 }

@@ -1,6 +1,8 @@
 //! `etendue chart`: draws what `etendue bench` wrote; measures nothing.
 
 mod compare;
+mod contest;
+mod estimate;
 mod panels;
 mod report;
 mod table;

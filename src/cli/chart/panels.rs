@@ -27,7 +27,7 @@ pub fn note(lines: &[Line]) -> String {
     });
     let place = machine.map(|m| format!("{}, {} cores. ", m.device, m.cores));
     format!(
-        "{}Medians; bands and whiskers: 5 to 95 % of the seeds.",
+        "{}Errors: root of the mean relMSE; all else medians. Bands and whiskers: 5 to 95 % of the seeds.",
         place.unwrap_or_default()
     )
 }
@@ -47,9 +47,10 @@ pub fn errors(lines: &[Line]) -> Vec<Panel> {
                     level.map(|r| f(r)).collect()
                 };
                 let errors = at(|r| r.relmse.sqrt());
+                let squares = at(|r| r.relmse);
                 Point {
                     x: quantile(&at(|r| r.seconds), 0.5),
-                    y: quantile(&errors, 0.5),
+                    y: (squares.iter().sum::<f64>() / squares.len() as f64).sqrt(),
                     low: quantile(&errors, BAND.0),
                     high: quantile(&errors, BAND.1),
                 }
@@ -129,15 +130,12 @@ pub fn limit_lines(lines: &[Line]) -> Vec<&Limit> {
 
 /// Parts of the time of a render that are measured by themselves, and the share of each.
 type Part = (&'static str, fn(&Limit) -> f64);
-const PARTS: [Part; 3] = [
+const PARTS: [Part; 2] = [
     ("traversal: its rays alone", |l| {
         l.seconds_replay / l.seconds
     }),
     ("shading: what rays meet is known", |l| {
         l.seconds_shading / l.seconds
-    }),
-    ("the rest", |l| {
-        1.0 - (l.seconds_replay + l.seconds_shading) / l.seconds
     }),
 ];
 
@@ -151,8 +149,7 @@ pub fn limits(lines: &[Line]) -> Vec<Panel> {
     for scene in distinct(all.iter().map(|l| l.scene.as_str())) {
         for (name, share) in PARTS {
             let own = all.iter().filter(|l| l.scene == scene);
-            // what is measured by parts may take longer than the whole
-            let shares: Vec<f64> = own.map(|l| 100.0 * share(l).max(0.0)).collect();
+            let shares: Vec<f64> = own.map(|l| 100.0 * share(l)).collect();
             bars.push(Bar {
                 group: scene.to_owned(),
                 name: name.to_owned(),

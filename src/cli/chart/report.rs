@@ -11,7 +11,7 @@ use etendue::chart::{Panel, Sheet, escape, plain};
 use super::super::bench::record::{self, Line};
 use super::distinct;
 use super::table::Table;
-use super::{panels, tables};
+use super::{contest, panels, tables};
 
 /// The page; pictures are read from `folder`.
 pub fn html(lines: &[Line], folder: &Path) -> Result<String> {
@@ -31,8 +31,8 @@ pub fn html(lines: &[Line], folder: &Path) -> Result<String> {
         body += &section(title, panels, &note, id);
         let tables = match id {
             "errors" => vec![
-                tables::best(lines),
-                tables::equal_error(lines),
+                contest::best(lines),
+                contest::equal_error(lines),
                 tables::last_runs(lines),
             ],
             "rates" => vec![tables::rates(lines)],
@@ -50,8 +50,8 @@ pub fn html(lines: &[Line], folder: &Path) -> Result<String> {
 /// The tables alone, in Markdown.
 pub fn markdown(lines: &[Line]) -> String {
     let all = [
-        tables::best(lines),
-        tables::equal_error(lines),
+        contest::best(lines),
+        contest::equal_error(lines),
         tables::last_runs(lines),
         tables::rates(lines),
         tables::limits(lines),

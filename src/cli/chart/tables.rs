@@ -3,13 +3,10 @@
 use etendue::chart::plain;
 
 use super::super::bench::record::{Growth, Limit, Line, Rate, Run};
-use super::compare::{best as best_of, disagrees, means, ratios, renderer};
 use super::panels::{self, runs};
 use super::table::Table;
 use super::{distinct, quantile};
 
-/// Whom the others are compared with.
-const BASE: &str = "etendue full";
 /// Against whose rate those of the other traversals are held, where it was measured.
 const BASE_BACKEND: &str = "ray-query";
 /// Slopes of growth are fitted where the value is at least this share of the largest.
@@ -17,135 +14,6 @@ const FITTED: f64 = 0.01;
 
 fn range((low, high): (f64, f64)) -> String {
     format!("{} to {}", plain(low), plain(high))
-}
-
-/// Every peer on every scene, by its best contender.
-pub fn best(lines: &[Line]) -> Table {
-    let all = ratios(lines, BASE);
-    let found = best_of(lines, &all);
-    let scenes = distinct(runs(lines).into_iter().map(|r| r.scene.as_str()));
-    let starts = lines.iter().filter_map(|line| match line {
-        Line::Start(s) => s.renderer.as_deref(),
-        _ => None,
-    });
-    let mut rows = Vec::new();
-    for peer in distinct(starts).into_iter().filter(|r| *r != "etendue") {
-        for scene in &scenes {
-            let own = found.iter().find(|f| f.0 == *scene && f.1 == peer);
-            let cells = match own {
-                Some((_, _, contender, r)) => {
-                    let way = contender.strip_prefix(peer).unwrap_or(contender).trim();
-                    let with = r.with_start.map(plain).unwrap_or_default();
-                    [way.to_owned(), plain(r.median), range(r.range), with]
-                }
-                None => {
-                    let why = without(lines, scene, peer);
-                    [why, String::new(), String::new(), String::new()]
-                }
-            };
-            let mut row = vec![peer.to_owned(), (*scene).to_owned()];
-            row.extend(cells);
-            rows.push(row);
-        }
-        let own = || found.iter().filter(|f| f.1 == peer);
-        let with = own().filter_map(|f| Some((peer, f.3.with_start?)));
-        for (name, count, mean) in means(own().map(|f| (peer, f.3.median))) {
-            let with = means(with.clone()).first().map(|m| plain(m.2));
-            let least = own().map(|f| f.3.median).fold(f64::INFINITY, f64::min);
-            rows.push(vec![
-                name.to_owned(),
-                format!("geometric mean of {count}"),
-                String::new(),
-                plain(mean),
-                format!("least {}", plain(least)),
-                with.unwrap_or_default(),
-            ]);
-        }
-    }
-    Table {
-        title: "Peers at their best: time to equal relMSE as a multiple of that of etendue full",
-        head: vec![
-            "renderer",
-            "scene",
-            "its best way",
-            "its time over ours",
-            "over the seeds",
-            "with start-up",
-        ],
-        texts: 3,
-        rows,
-    }
-}
-
-/// Why a peer is not compared on a scene.
-fn without(lines: &[Line], scene: &str, peer: &str) -> String {
-    let reason = lines.iter().find_map(|line| match line {
-        Line::Skipped(s) if s.scene == scene && s.contender == peer => Some(&s.reason),
-        _ => None,
-    });
-    match reason {
-        Some(reason) => format!("not expressed: {reason}"),
-        None if renders(lines, scene, peer) => String::from("not compared: no agreement"),
-        None => String::from("not measured"),
-    }
-}
-
-/// Whether a peer has runs of a scene.
-fn renders(lines: &[Line], scene: &str, peer: &str) -> bool {
-    let mut all = runs(lines).into_iter();
-    all.any(|r| r.scene == scene && renderer(lines, &r.contender) == peer)
-}
-
-/// Time to equal error against the full estimator, for every contender.
-pub fn equal_error(lines: &[Line]) -> Table {
-    let ratios = ratios(lines, BASE);
-    let mut rows: Vec<Vec<String>> = Vec::new();
-    let scenes = distinct(runs(lines).into_iter().map(|r| r.scene.as_str()));
-    let names = distinct(runs(lines).into_iter().map(|r| r.contender.as_str()));
-    for scene in scenes {
-        for name in names.iter().filter(|n| **n != BASE) {
-            let cells = if let Some(a) = disagrees(lines, scene, name) {
-                let percent = plain(100.0 * a.difference);
-                let error = plain(100.0 * a.error);
-                [
-                    format!("not compared: mean off by {percent} ± {error} %"),
-                    String::new(),
-                    String::new(),
-                ]
-            } else if let Some((_, _, r)) = ratios.iter().find(|r| r.0 == scene && r.1 == *name) {
-                let with = r.with_start.map(plain).unwrap_or_default();
-                [plain(r.median), range(r.range), with]
-            } else {
-                continue;
-            };
-            let mut row = vec![scene.to_owned(), (*name).to_owned()];
-            row.extend(cells);
-            rows.push(row);
-        }
-    }
-    for (name, count, mean) in means(ratios.iter().map(|r| (r.1.as_str(), r.2.median))) {
-        let scenes = format!("geometric mean of {count}");
-        let empty = String::new();
-        rows.push(vec![
-            scenes,
-            name.to_owned(),
-            plain(mean),
-            empty.clone(),
-            empty,
-        ]);
-    }
-    Table {
-        title: "Time to equal relMSE, as a multiple of that of etendue full",
-        head: vec![
-            "scene",
-            "contender",
-            "its time over ours",
-            "over the seeds",
-            "with start-up",
-        ],
-        texts: 2,
-        rows,
-    }
 }
 
 /// The runs with the most samples of each contender.
