@@ -2,7 +2,9 @@
 //!
 //! [Roberts18] Roberts, The Unreasonable Effectiveness of Quasirandom Sequences.
 
+use std::panic::resume_unwind;
 use std::sync::Arc;
+use std::thread;
 
 use glam::DVec3;
 
@@ -10,7 +12,7 @@ use super::traversal::{GROUP, Traversal};
 use super::upload::SceneData;
 use super::vulkan::{Input, bind, upload};
 use crate::error::Result;
-use crate::gpu::{BindingKind, Buffer, Device, Memory, Usage};
+use crate::gpu::{BindingKind, Buffer, Device, Memory, Pipeline, Usage};
 use crate::guide;
 use crate::layout::{self, Photon, PhotonStart};
 use crate::spec::Spec;
@@ -22,7 +24,8 @@ const TRIANGLES: usize = 1 << 20;
 /// Surfaces of a roughness up to this bend light. What rougher ones send on is found by chance soon enough.
 const SMOOTH: f32 = 0.3;
 
-/// The guide's texels, by photons that the scene's traversal traces; `None` where nothing bends light, or none of it arrives.
+/// The guide's texels, by photons that the scene's traversal traces, and the kernel that renders with them, which `compile`
+/// makes meanwhile: a driver takes one core for one kernel. `None` where nothing bends light, or none of it arrives.
 pub(super) fn guide(
     device: &Arc<Device>,
     traversal: &Traversal,
@@ -30,11 +33,37 @@ pub(super) fn guide(
     shared: &[Input],
     data: &SceneData,
     by_address: bool,
-) -> Result<Option<Vec<guide::Texel>>> {
+    compile: impl Fn(&Spec) -> Result<Pipeline> + Sync,
+) -> Result<Option<(Vec<guide::Texel>, Pipeline)>> {
     let starts = starts(data);
     if starts.is_empty() {
         return Ok(None);
     }
+    let (texels, pipeline) = thread::scope(|scope| {
+        let pipeline = scope.spawn(|| compile(spec));
+        let texels = trace(device, traversal, spec, shared, &starts, by_address);
+        (texels, pipeline.join())
+    });
+    let pipeline = pipeline.unwrap_or_else(|panic| resume_unwind(panic));
+    match texels? {
+        Some(texels) => Ok(Some((texels, pipeline?))),
+        None => Ok(None),
+    }
+}
+
+/// Traces the photons.
+fn trace(
+    device: &Arc<Device>,
+    traversal: &Traversal,
+    spec: &Spec,
+    shared: &[Input],
+    starts: &[PhotonStart],
+    by_address: bool,
+) -> Result<Option<Vec<guide::Texel>>> {
+    let spec = Spec {
+        guide: false,
+        ..*spec
+    };
     let storage = BindingKind::Storage;
     let mut bindings: Vec<_> = shared.iter().map(|(at, kind, _)| (*at, *kind)).collect();
     bindings.extend([
@@ -42,8 +71,8 @@ pub(super) fn guide(
         (layout::BIND_PHOTONS, storage),
     ]);
     bindings.extend(traversal.bindings());
-    let pipeline = traversal.photon_pipeline(device, spec, &bindings, by_address)?;
-    let input = upload(device, "photon starts", &starts)?;
+    let pipeline = traversal.photon_pipeline(device, &spec, &bindings, by_address)?;
+    let input = upload(device, "photon starts", starts)?;
     let output = Buffer::new(
         device,
         "photons",

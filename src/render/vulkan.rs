@@ -22,7 +22,7 @@ use crate::gpu::{
 };
 use crate::layout::{self, ProbeHit, ProbeRay, StreamRay};
 use crate::settings::BackendChoice;
-use crate::spec;
+use crate::spec::Spec;
 
 /// Records that mix integers and floats are read as integers, whose bits no device changes.
 pub(super) const RECORDS: TexelFormat = TexelFormat::Rgba32Uint;
@@ -74,7 +74,7 @@ pub(super) struct VulkanBackend {
     device: Arc<Device>,
     traversal: Traversal,
     params: layout::Params,
-    spec: spec::Spec,
+    spec: Spec,
     /// Everything that both kernels read.
     shared: Vec<Input>,
     film: Buffer,
@@ -189,15 +189,27 @@ impl VulkanBackend {
             let buffer = Buffer::from_slice(device, "addresses", Usage::UNIFORM, &table)?;
             shared.push((layout::BIND_ADDRESSES, BindingKind::Uniform, buffer));
         }
-        if std::mem::take(&mut spec.guide) {
-            if let Some(guide) =
-                photons::guide(device, &traversal, &spec, &shared, data, by_address)?
-            {
-                spec.guide = true;
-                let guide = input(layout::BIND_GUIDE, "guide", RECORDS, cast_slice(&guide))?;
-                replace(&mut shared, &traversal, [guide])?;
-            }
-        }
+        let storage = BindingKind::Storage;
+        let mut bindings: Vec<_> = shared.iter().map(|(at, kind, _)| (*at, *kind)).collect();
+        bindings.extend([(layout::BIND_FILM, storage), (layout::BIND_LEDGER, storage)]);
+        bindings.extend(traversal.bindings());
+        let compile = |spec: &Spec| {
+            traversal.path_pipeline(device, spec, &bindings, tuning.study, by_address)
+        };
+        let guided = match spec.guide {
+            true => photons::guide(
+                device, &traversal, &spec, &shared, data, by_address, compile,
+            )?,
+            false => None,
+        };
+        spec.guide = guided.is_some();
+        let pipeline = if let Some((guide, pipeline)) = guided {
+            let guide = input(layout::BIND_GUIDE, "guide", RECORDS, cast_slice(&guide))?;
+            replace(&mut shared, &traversal, [guide])?;
+            pipeline
+        } else {
+            compile(&spec)?
+        };
 
         let film = Buffer::new(
             device,
@@ -213,12 +225,6 @@ impl VulkanBackend {
             Usage::STORAGE,
             gpu::Memory::DeviceLocal,
         )?;
-        let storage = BindingKind::Storage;
-        let mut bindings: Vec<_> = shared.iter().map(|(at, kind, _)| (*at, *kind)).collect();
-        bindings.extend([(layout::BIND_FILM, storage), (layout::BIND_LEDGER, storage)]);
-        bindings.extend(traversal.bindings());
-        let pipeline =
-            traversal.path_pipeline(device, &spec, &bindings, tuning.study, by_address)?;
         let others = [(layout::BIND_FILM, &film), (layout::BIND_LEDGER, &ledger)];
         let set = bind(&pipeline, "path", &shared, &others, &traversal)?;
         memory.acceleration = traversal.bytes();

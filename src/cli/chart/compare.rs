@@ -133,22 +133,25 @@ fn level(runs: &[&Run], seeds: &[u64], spp: u64, error: fn(&Run) -> f64) -> (f64
 
 /// Seconds of `base` and of `other` to the larger of their last errors. Curves are (seconds, relMSE).
 fn times(base: &[(f64, f64)], other: &[(f64, f64)]) -> Option<(f64, f64)> {
-    let target = base.last()?.1.max(other.last()?.1);
-    Some((time(base, target)?, time(other, target)?))
+    let (a, b) = (base.last()?, other.last()?);
+    match a.1 > b.1 {
+        true => Some((a.0, time(other, a.1)?)),
+        false => Some((time(base, b.1)?, b.0)),
+    }
 }
 
-/// Seconds to an error: between two points on a straight line in logarithms; where even the first point is
-/// better, by the law that error² × time is constant.
+/// Seconds after which the error stays below `target`, as the last one does: between two points on a straight line in
+/// logarithms; where even the first point is better, by the law that error² × time is constant.
 fn time(curve: &[(f64, f64)], target: f64) -> Option<f64> {
-    let first = curve.first()?;
-    if first.1 <= target {
-        return Some(first.0 * first.1 / target).filter(|t| *t > 0.0);
-    }
-    let pair = curve.windows(2).find(|pair| pair[1].1 <= target)?;
     let logs = |p: (f64, f64)| (p.0.ln(), p.1.ln());
-    let ((t0, e0), (t1, e1)) = (logs(pair[0]), logs(pair[1]));
-    let time = (t0 + (t1 - t0) * (target.ln() - e0) / (e1 - e0)).exp();
-    time.is_finite().then_some(time)
+    let time = match curve.windows(2).rev().find(|pair| pair[0].1 > target) {
+        Some(pair) => {
+            let ((t0, e0), (t1, e1)) = (logs(pair[0]), logs(pair[1]));
+            (t0 + (t1 - t0) * (target.ln() - e0) / (e1 - e0)).exp()
+        }
+        None => curve.first().map(|first| first.0 * first.1 / target)?,
+    };
+    (time.is_finite() && time > 0.0).then_some(time)
 }
 
 #[cfg(test)]
@@ -194,6 +197,10 @@ mod tests {
         assert!((ratio(&slow, &fast) - 0.5).abs() < 1e-12);
         // the same, with samples that reach elsewhere
         assert!((ratio(&fast[..3], &slow[1..]) - 2.0).abs() < 1e-12);
+        // a lucky start does not count
+        let lucky = [(1.0, 1e-3), (2.0, 0.5), (4.0, 0.25)];
+        assert!((ratio(&lucky, &slow) - 1.0).abs() < 1e-12);
+        assert!((ratio(&slow, &lucky) - 1.0).abs() < 1e-12);
         // even one sample is better than all that the other reaches
         let good = [(1.0, 1e-3), (2.0, 5e-4)];
         assert!((ratio(&good, &slow) - 16.0 / (1e-3 * 16.0)).abs() < 1e-9);
