@@ -2,10 +2,10 @@
 //! rare samples carry much of the light it is small in most pixels and large in a few. So the relative variance of
 //! pixels around that look alike counts as one more degree of freedom, as the prior of \[Smyth04\]:
 //!
-//! s² = (ν s₀² + r m²) / (ν + 1), r = Σ s₀² / Σ m² over the pixels alike,
+//! s² = (ν s₀² + r m²) / (ν + 1), r the mean of s₀²/m² over the pixels alike,
 //!
 //! for a mean m with s₀², its squared standard error from the ν + 1 parts of the pixel alone. The interval is that of
-//! Student's t with ν + 1 degrees of freedom.
+//! Student's t with ν + 1 degrees of freedom. Pixels look alike whose surroundings are about as bright and as noisy.
 //!
 //! References: \[Smyth04\] G. K. Smyth: Linear models and empirical Bayes methods for assessing differential
 //! expression in microarray experiments, Statistical Applications in Genetics and Molecular Biology 3 (2004).
@@ -15,7 +15,7 @@ use crate::tails::student_quantile;
 
 /// Pixels to each side that may be asked.
 const REACH: usize = 4;
-/// Pixels are alike whose brightness differs by no more than this part of the larger one.
+/// Pixels are alike whose brightness and relative error differ by no more than this part of the larger one.
 const LIKENESS: f64 = 0.3;
 /// Degrees of freedom that they count for.
 const WEIGHT: f64 = 1.0;
@@ -50,7 +50,7 @@ impl Film {
                     variance: error[channel] * error[channel],
                 })
                 .collect();
-            let brightness = medians(&own, width);
+            let neighbours = Neighbours::new(&own, width);
             for (pixel, half) in half.iter_mut().enumerate() {
                 let Moments { mean, variance } = own[pixel];
                 let student = students[self.allotment.exponent(pixel) as usize];
@@ -58,7 +58,7 @@ impl Film {
                     half[channel] = f32::INFINITY;
                     continue;
                 };
-                let prior = relative_variance(&own, &brightness, width, pixel) * mean * mean;
+                let prior = neighbours.relative_variance(pixel) * mean * mean;
                 let moderated = (degrees * variance + WEIGHT * prior) / (degrees + WEIGHT);
                 half[channel] = (quantile * moderated.sqrt()) as f32;
             }
@@ -75,33 +75,68 @@ struct Moments {
     variance: f64,
 }
 
-/// Medians of the means of 3 × 3 pixels: brightness that single bright pixels do not change.
-fn medians(own: &[Moments], width: usize) -> Vec<f64> {
+/// What pixels can tell of each other.
+struct Neighbours {
+    width: usize,
+    /// Variance over squared mean; 0 where all is black.
+    relative: Vec<f64>,
+    /// Medians of the means of 3 × 3 pixels: brightness that single bright pixels do not change.
+    brightness: Vec<f64>,
+    /// Medians of their relative errors.
+    noise: Vec<f64>,
+}
+
+impl Neighbours {
+    fn new(own: &[Moments], width: usize) -> Self {
+        let relative = |m: &Moments| match m.mean {
+            0.0 => 0.0,
+            mean => m.variance / (mean * mean),
+        };
+        let relative: Vec<f64> = own.iter().map(relative).collect();
+        let means: Vec<f64> = own.iter().map(|m| m.mean).collect();
+        let errors: Vec<f64> = relative.iter().map(|r| r.sqrt()).collect();
+        Self {
+            width,
+            relative,
+            brightness: medians(&means, width),
+            noise: medians(&errors, width),
+        }
+    }
+
+    /// The mean over the pixels around that look alike, the pixel itself included.
+    fn relative_variance(&self, pixel: usize) -> f64 {
+        let (brightness, noise) = (self.brightness[pixel], self.noise[pixel]);
+        let is_alike = |other: usize| {
+            is_near(self.brightness[other], brightness)
+                // Where most pixels show no noise, nothing is known of it.
+                && (noise == 0.0 || is_near(self.noise[other], noise))
+        };
+        let (mut sum, mut count) = (0.0, 0.0);
+        for row in rows_around(pixel, self.width, self.relative.len(), REACH) {
+            for other in row.filter(|&other| is_alike(other)) {
+                sum += self.relative[other];
+                count += 1.0;
+            }
+        }
+        sum / f64::max(count, 1.0)
+    }
+}
+
+fn is_near(a: f64, b: f64) -> bool {
+    (a - b).abs() <= LIKENESS * a.abs().max(b.abs())
+}
+
+fn medians(values: &[f64], width: usize) -> Vec<f64> {
     let mut near = Vec::with_capacity(9);
     let median = |pixel| {
         near.clear();
-        for row in rows_around(pixel, width, own.len(), 1) {
-            near.extend(own[row].iter().map(|moments| moments.mean));
+        for row in rows_around(pixel, width, values.len(), 1) {
+            near.extend(&values[row]);
         }
         near.sort_unstable_by(f64::total_cmp);
         near[near.len() / 2]
     };
-    (0..own.len()).map(median).collect()
-}
-
-/// Variance over squared mean of the pixels around that look alike, the pixel itself included; 0 where all is black.
-fn relative_variance(own: &[Moments], brightness: &[f64], width: usize, pixel: usize) -> f64 {
-    let this = brightness[pixel];
-    let (mut variance, mut square) = (0.0, 0.0);
-    for row in rows_around(pixel, width, own.len(), REACH) {
-        for (moments, &other) in own[row.clone()].iter().zip(&brightness[row]) {
-            if (other - this).abs() <= LIKENESS * other.abs().max(this.abs()) {
-                variance += moments.variance;
-                square += moments.mean * moments.mean;
-            }
-        }
-    }
-    if square > 0.0 { variance / square } else { 0.0 }
+    (0..values.len()).map(median).collect()
 }
 
 #[cfg(test)]
@@ -163,7 +198,7 @@ mod tests {
         let half = film([side, side], 2, value).interval(0.95);
         let quantile = student_quantile(0.05, 2.0);
         // Its mean is 1.5 and its squared standard error 1/4. Of the 81 pixels around 63 are bright.
-        let relative = |bright: f64| 0.25 / (1.5 * 1.5 + 4.0 * (bright - 1.0));
+        let relative = |bright: f64| 0.25 / (1.5 * 1.5) / bright;
         let own = quantile * ((0.25 + relative(63.0) * 2.25) / 2.0).sqrt();
         assert!((f64::from(half[middle][1]) / own - 1.0).abs() < 1e-6);
         // Four to the left and four up, 6 × 6 pixels are near enough and in the picture.
@@ -172,6 +207,20 @@ mod tests {
         assert!((found / corner - 1.0).abs() < 1e-6, "{found} {corner}");
         // Nothing is known to vary beyond the reach, nor where it is dark.
         assert_eq!([half[0], half[middle + 3]], [[0.0; 3]; 2]);
+    }
+
+    #[test]
+    fn what_is_noisy_does_not_widen_what_is_quiet() {
+        // Two samples; all pixels are as bright, and those to the left ten times as noisy.
+        let noise = |pixel: usize| if pixel % 12 < 6 { 0.5 } else { 0.05 };
+        let value = |sample: u64, pixel: usize| 1.0 + noise(pixel) * (sample as f32 - 0.5);
+        let half = film([12, 12], 2, value).interval(0.95);
+        for (pixel, half) in half.iter().enumerate() {
+            // half the difference of the samples
+            let own = student_quantile(0.05, 2.0) * 0.5 * f64::from(noise(pixel));
+            let found = f64::from(half[0]);
+            assert!((found / own - 1.0).abs() < 1e-5, "{pixel}: {found} {own}");
+        }
     }
 
     #[test]
