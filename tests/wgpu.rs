@@ -99,6 +99,11 @@ fn assert_same_by_all_ways(scene: &str) {
 }
 
 fn assert_same(scene: &str, native: BackendChoice, way: BackendChoice, tuning: Tuning) {
+    // no photons are traced through wgpu
+    let tuning = Tuning {
+        guide: false,
+        ..tuning
+    };
     let Some(mut native) = tuned(scene, native, tuning) else {
         return;
     };

@@ -1,8 +1,8 @@
-//! What tests and measurements may change of a render, and the picture stays the same.
+//! What tests and measurements may change of a render.
 
 use super::{geometry, passes};
 
-/// Details that do not change the picture; for tests and measurements.
+/// Details that do not change the picture, unless they say so; for tests and measurements.
 #[doc(hidden)]
 #[derive(Clone, Copy, Debug)]
 pub struct Tuning {
@@ -26,6 +26,8 @@ pub struct Tuning {
     /// Whether the device's own structures hold boxes, and shaders test the triangles in them; `None`: on CPUs, whose
     /// own test has gaps at edges.
     pub boxes: Option<bool>,
+    /// Whether photons may tell paths where to look. Without, the picture is another one of the same expected value.
+    pub guide: bool,
     /// Renders by a kernel that is slower and tells more.
     pub study: Study,
 }
@@ -66,6 +68,7 @@ impl Default for Tuning {
             small: None,
             addresses: None,
             boxes: None,
+            guide: true,
             study: Study::None,
         }
     }

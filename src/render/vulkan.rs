@@ -196,7 +196,7 @@ impl VulkanBackend {
         let compile = |spec: &Spec| {
             traversal.path_pipeline(device, spec, &bindings, tuning.study, by_address)
         };
-        let guided = match spec.guide {
+        let guided = match spec.guide && tuning.guide {
             true => photons::guide(
                 device, &traversal, &spec, &shared, data, by_address, compile,
             )?,
