@@ -6,7 +6,7 @@ use super::panels::runs;
 use super::{distinct, quantile};
 
 /// What another contender needs, as a multiple of what the base does.
-#[derive(Clone, Copy)]
+#[derive(Clone)]
 pub struct Ratio {
     /// Time to the relMSE that both reach, in the mean over the seeds.
     pub time: Estimate,
@@ -71,8 +71,13 @@ pub fn best(
         }
         match found.iter_mut().find(|f| f.0 == *scene && f.1 == peer) {
             Some(other) if other.3.time.value() <= ratio.time.value() => {}
-            Some(other) => (other.2, other.3) = (contender.clone(), *ratio),
-            None => found.push((scene.clone(), peer.to_owned(), contender.clone(), *ratio)),
+            Some(other) => (other.2, other.3) = (contender.clone(), ratio.clone()),
+            None => found.push((
+                scene.clone(),
+                peer.to_owned(),
+                contender.clone(),
+                ratio.clone(),
+            )),
         }
     }
     found

@@ -25,7 +25,7 @@ fn times(r: &Ratio) -> [String; 4] {
 
 /// Geometric means of the same, and the least of the values.
 fn mean_times(all: &[&Ratio]) -> Option<([String; 4], f64)> {
-    let times: Vec<Estimate> = all.iter().map(|r| r.time).collect();
+    let times: Vec<Estimate> = all.iter().map(|r| r.time.clone()).collect();
     let mean = Estimate::geometric_mean(&times)?;
     let with: Option<Vec<f64>> = all.iter().map(|r| r.with_start).collect();
     let medians: Vec<f64> = all.iter().map(|r| r.seeds[0]).collect();
@@ -35,7 +35,7 @@ fn mean_times(all: &[&Ratio]) -> Option<([String; 4], f64)> {
         plain(geometric_mean(&medians)),
         with.map(|w| plain(geometric_mean(&w))).unwrap_or_default(),
     ];
-    let values = times.iter().map(|t| t.value());
+    let values = times.iter().map(Estimate::value);
     Some((cells, values.fold(f64::INFINITY, f64::min)))
 }
 
@@ -140,7 +140,7 @@ pub fn equal_error(lines: &[Line]) -> Table {
             .filter(|r| r.1 == name)
             .map(|r| &r.2)
             .collect();
-        let works: Vec<Estimate> = own.iter().map(|r| r.work).collect();
+        let works: Vec<Estimate> = own.iter().map(|r| r.work.clone()).collect();
         let work = Estimate::geometric_mean(&works);
         if let Some(((cells, _), work)) = mean_times(&own).zip(work) {
             let scenes = format!("geometric mean of {}", own.len());

@@ -3,20 +3,17 @@
 use etendue::chart::plain;
 use etendue::tails::student_quantile;
 
+use super::distinct;
+
 /// Confidence of the intervals.
 const CONFIDENCE: f64 = 0.95;
 
 /// A positive number and how uncertain it is, by its logarithm.
-#[derive(Clone, Copy)]
+#[derive(Clone)]
 pub struct Estimate {
     ln: f64,
-    spread: Option<Spread>,
-}
-
-#[derive(Clone, Copy)]
-struct Spread {
-    /// Of the logarithm.
-    variance: f64,
+    /// Of seeds what the logarithm deviates by for their sake: the sum of the squares is its variance. Empty with one seed.
+    parts: Vec<(u64, f64)>,
     degrees: f64,
 }
 
@@ -29,53 +26,58 @@ impl Estimate {
             let others: Vec<u64> = seeds.iter().copied().filter(|s| s != seed).collect();
             ln(&others)
         };
-        let count = seeds.len() as f64;
-        let spread = |each: Vec<f64>| {
-            let mean = each.iter().sum::<f64>() / count;
-            let squares: f64 = each.iter().map(|ln| (ln - mean).powi(2)).sum();
-            Spread {
-                variance: (count - 1.0) / count * squares,
-                degrees: count - 1.0,
-            }
-        };
         let each: Option<Vec<f64>> = seeds.iter().map(without).collect();
+        let each = each.filter(|_| seeds.len() > 1).unwrap_or_default();
+        let count = each.len() as f64;
+        let mean = each.iter().sum::<f64>() / count;
+        let part = |ln: &f64| (ln - mean) * ((count - 1.0) / count).sqrt();
         Some(Self {
             ln: ln(seeds)?,
-            spread: each.filter(|_| seeds.len() > 1).map(spread),
+            parts: seeds.iter().copied().zip(each.iter().map(part)).collect(),
+            degrees: count - 1.0,
         })
     }
 
-    /// Geometric mean of independent numbers; None of none.
+    /// Geometric mean; None of none. What scenes have of one seed goes together, since they may be much alike.
     pub fn geometric_mean(all: &[Self]) -> Option<Self> {
         let count = all.len() as f64;
-        let spreads: Option<Vec<Spread>> = all.iter().map(|e| e.spread).collect();
-        // degrees of freedom by Welch and Satterthwaite
-        let spread = |spreads: Vec<Spread>| {
-            let sum: f64 = spreads.iter().map(|s| s.variance).sum();
-            let squares = spreads.iter().map(|s| s.variance.powi(2) / s.degrees);
-            Spread {
-                variance: sum / (count * count),
-                degrees: sum * sum / squares.sum::<f64>(),
-            }
+        let known = all.iter().all(|e| !e.parts.is_empty());
+        let parts = all.iter().filter(|_| known).flat_map(|e| &e.parts);
+        let seeds = distinct(parts.clone().map(|part| part.0));
+        let of = |seed| {
+            parts
+                .clone()
+                .filter(move |part| part.0 == seed)
+                .map(|p| p.1)
         };
+        let variances: f64 = all.iter().map(Self::variance).sum();
+        let degrees: f64 = all.iter().map(|e| e.variance() * e.degrees).sum();
         (!all.is_empty()).then(|| Self {
             ln: all.iter().map(|e| e.ln).sum::<f64>() / count,
-            spread: spreads.map(spread),
+            parts: seeds
+                .into_iter()
+                .map(|seed| (seed, of(seed).sum::<f64>() / count))
+                .collect(),
+            degrees: degrees / variances,
         })
     }
 
-    pub fn value(self) -> f64 {
+    fn variance(&self) -> f64 {
+        self.parts.iter().map(|part| part.1 * part.1).sum()
+    }
+
+    pub fn value(&self) -> f64 {
         self.ln.exp()
     }
 
     /// The 95 % interval by Student's t; empty with one seed.
-    pub fn interval(self) -> String {
-        let Some(spread) = self.spread else {
+    pub fn interval(&self) -> String {
+        if self.parts.is_empty() {
             return String::new();
-        };
-        let half = match spread.variance > 0.0 {
-            true => student_quantile(1.0 - CONFIDENCE, spread.degrees) * spread.variance.sqrt(),
-            false => 0.0,
+        }
+        let half = match self.variance() {
+            0.0 => 0.0,
+            variance => student_quantile(1.0 - CONFIDENCE, self.degrees) * variance.sqrt(),
         };
         let (low, high) = (self.ln - half, self.ln + half);
         format!("{} to {}", plain(low.exp()), plain(high.exp()))
@@ -98,9 +100,8 @@ mod tests {
     fn leaving_out_seeds_gives_the_standard_error_of_a_mean() {
         // exp undoes the logarithm: the jackknife of a mean is its usual standard error, here √(0.625/5)
         let estimate = Estimate::new(&[1, 2, 3, 4, 5], |some| mean(some).map(f64::exp)).unwrap();
-        let spread = estimate.spread.unwrap();
-        assert!((spread.variance - 0.125).abs() < 1e-12);
-        assert_eq!(spread.degrees, 4.0);
+        assert!((estimate.variance() - 0.125).abs() < 1e-12);
+        assert_eq!(estimate.degrees, 4.0);
         // t of four degrees of freedom in tables: 2.776
         let half = 2.776 * 0.125_f64.sqrt();
         let ends = [2.0 - half, 2.0 + half].map(|x| plain(x.exp()));
@@ -116,12 +117,23 @@ mod tests {
     }
 
     #[test]
-    fn a_mean_of_four_is_half_as_uncertain() {
+    fn means_of_what_has_other_seeds_are_less_uncertain() {
         let one = Estimate::new(&[1, 2, 3, 4, 5], mean).unwrap();
-        let four = Estimate::geometric_mean(&[one; 4]).unwrap();
-        let (one, four) = (one.spread.unwrap(), four.spread.unwrap());
-        assert!((four.variance - one.variance / 4.0).abs() < 1e-12);
-        assert!((four.degrees - 16.0).abs() < 1e-9);
+        let shifted = |by: u64| {
+            let seeds = [1, 2, 3, 4, 5].map(|s| s + by);
+            Estimate::new(&seeds, |some| {
+                mean(&some.iter().map(|s| s - by).collect::<Vec<_>>())
+            })
+        };
+        let others: Vec<Estimate> = (0..4).map(|k| shifted(10 * k).unwrap()).collect();
+        for (all, share) in [(vec![one.clone(); 4], 1.0), (others, 0.25)] {
+            let four = Estimate::geometric_mean(&all).unwrap();
+            assert!((four.variance() - share * one.variance()).abs() < 1e-12);
+            assert!((four.degrees - 4.0).abs() < 1e-9);
+        }
         assert!(Estimate::geometric_mean(&[]).is_none());
+        let single = Estimate::new(&[4], mean).unwrap();
+        let mixed = Estimate::geometric_mean(&[one, single]).unwrap();
+        assert_eq!(mixed.interval(), "");
     }
 }
