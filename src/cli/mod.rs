@@ -36,6 +36,7 @@ use self::failure::{Failure, Outcome};
 /// The whole program.
 pub fn main() -> ExitCode {
     failure::report_panics_as_errors();
+    etendue::gpu::widen_vectors();
     #[cfg(feature = "faults")]
     etendue::fault::arm_from_environment();
     let outcome = match Arguments::parse().command {

@@ -17,6 +17,8 @@
 //!    compiled by this crate's build script; that it stays within its buffers is
 //!    proved by tests and validation, not by this module. What it reads by an
 //!    address is bound as well, which keeps it alive.
+//!
+//! Beside Vulkan, [`widen_vectors`] changes the environment, while the process has a single thread.
 #![allow(
     unsafe_code,
     reason = "Vulkan is a C interface; the five rules above keep it inside this folder"
@@ -34,6 +36,7 @@ mod kept;
 #[cfg(feature = "wgpu")]
 pub(crate) mod passthrough;
 mod pipeline;
+mod processor;
 mod rays;
 #[cfg(feature = "faults")]
 #[doc(hidden)]
@@ -47,6 +50,7 @@ pub use commands::{Commands, GpuTime};
 pub use device::{Device, DeviceRequest, enumerate};
 pub use instance::ValidationLog;
 pub use pipeline::{BindSet, BindingKind, Pipeline, PipelineDesc, Resource};
+pub use processor::{gathers_fast, widen_vectors};
 pub use rays::RayStages;
 pub use usage::{TexelFormat, Usage};
 

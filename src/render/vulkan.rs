@@ -18,7 +18,7 @@ use crate::bvh::Bvh;
 use crate::error::{Error, Result};
 use crate::gpu::{
     self, BindSet, BindingKind, Buffer, Caps, Device, DeviceKind, DeviceRequest, Pipeline,
-    Resource, TexelFormat, Usage,
+    Resource, TexelFormat, Usage, gathers_fast,
 };
 use crate::layout::{self, ProbeHit, ProbeRay, StreamRay};
 use crate::settings::BackendChoice;
@@ -108,7 +108,9 @@ impl VulkanBackend {
         let by_address = choice != BackendChoice::RayPipeline
             && tuning.study != Study::Record
             && device.caps().addresses
-            && tuning.addresses.unwrap_or(is_cpu && can_gather());
+            && tuning
+                .addresses
+                .unwrap_or(is_cpu && gathers_fast(device.caps().subgroup_size));
         let usage = match by_address {
             true => Usage::ADDRESS,
             false => Usage::default(),
@@ -474,14 +476,6 @@ fn check_share(caps: &Caps, choice: BackendChoice) -> Result<()> {
         what: String::from("--share"),
         missing: missing.to_owned(),
     })
-}
-
-/// Whether the processor gathers, as CPU drivers then do where shaders read by addresses.
-fn can_gather() -> bool {
-    #[cfg(target_arch = "x86_64")]
-    return std::arch::is_x86_feature_detected!("avx512vl");
-    #[cfg(not(target_arch = "x86_64"))]
-    return false;
 }
 
 /// A texel buffer, with `usage` besides.

@@ -6,7 +6,9 @@ use etendue::image_io::{Channel, Image, Metadata, write_exr};
 use etendue::settings::Crop;
 use serde_json::Value as Json;
 
-use super::support::{SKY, etendue, has_device, list, number, read, render, scene, stderr, text};
+use super::support::{
+    SKY, command, etendue, has_device, list, number, read, render, scene, stderr, text,
+};
 
 #[test]
 fn a_render_writes_every_output_with_its_header() {
@@ -148,6 +150,56 @@ fn the_seed_decides_the_pixels() {
     let pixels = |name: &str| read(&folder, name).channels;
     assert!(pixels("a.exr") == pixels("b.exr"));
     assert!(pixels("a.exr") != pixels("c.exr"));
+}
+
+/// Mesa's driver for CPUs takes its width from the environment, which the program sets where it knows better. The kernels
+/// of a width have a folder of their own, since the driver would mix them up.
+#[test]
+fn vectors_of_any_width_give_the_same_bits() {
+    if !has_device() {
+        return;
+    }
+    let folder = scene();
+    let veach = concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/veach.gltf");
+    let run = |kernels: &str, width: Option<&str>| {
+        let line = "render -o a.exr --spp 4 --width 24 --backend bvh --stats a.json";
+        let mut command = command(line, folder.path());
+        command
+            .arg(veach)
+            .env("MESA_SHADER_CACHE_DIR", folder.path().join(kernels))
+            .env_remove("LP_NATIVE_VECTOR_WIDTH");
+        if let Some(width) = width {
+            command.env("LP_NATIVE_VECTOR_WIDTH", width);
+        }
+        let output = command.output().unwrap();
+        assert!(output.status.success(), "{}", stderr(&output));
+        let stats = fs::read(folder.path().join("a.json")).unwrap();
+        let stats: Json = serde_json::from_slice(&stats).unwrap();
+        let device = stats["device"].as_str().unwrap().to_owned();
+        (device, read(&folder, "a.exr").channels)
+    };
+    let (device, pixels) = run("own", None);
+    if !device.starts_with("llvmpipe") {
+        eprintln!("skipped: {device} is not Mesa's driver for CPUs");
+        return;
+    }
+    #[cfg(target_arch = "x86_64")]
+    let is_wide = is_x86_feature_detected!("avx512fp16") && !is_x86_feature_detected!("sse4a");
+    #[cfg(not(target_arch = "x86_64"))]
+    let is_wide = false;
+    assert_eq!(device.contains("512 bits"), is_wide, "{device}");
+    let kept = folder.path().join("own/etendue-512-bits");
+    assert_eq!(kept.exists(), is_wide, "{}", kept.display());
+    for width in ["256", "512"] {
+        let (device, again) = run(width, Some(width));
+        assert!(device.contains(&format!("{width} bits")), "{device}");
+        assert_eq!(
+            list(&folder.path().join(width)).len(),
+            1,
+            "no folder within"
+        );
+        assert!(again == pixels, "{width} bits");
+    }
 }
 
 #[test]

@@ -89,6 +89,15 @@ fn same_seed_gives_the_same_bits_however_the_work_is_cut() {
                 max_tiles: 64,
                 ..default
             },
+            // both ways to read the scene's arrays
+            Tuning {
+                addresses: Some(false),
+                ..default
+            },
+            Tuning {
+                addresses: Some(true),
+                ..default
+            },
             // a kernel of the limit report
             Tuning {
                 study: Study::Counts,
