@@ -47,6 +47,11 @@ pub const SHADERS: &[Entry] = &[
     ),
     (
         "kernel.comp",
+        &["TRAVERSE_NOTHING", "KERNEL_REPLAY"],
+        "replay_nothing",
+    ),
+    (
+        "kernel.comp",
         &["TRAVERSE_SOFTWARE", "KERNEL_PROBE"],
         "probe_software",
     ),
@@ -133,6 +138,11 @@ pub const SHADERS: &[Entry] = &[
         "kernel.comp",
         &["TRAVERSE_QUERY", "ADDRESSES", "KERNEL_REPLAY"],
         "replay_query_addresses",
+    ),
+    (
+        "kernel.comp",
+        &["TRAVERSE_NOTHING", "ADDRESSES", "KERNEL_REPLAY"],
+        "replay_nothing_addresses",
     ),
     (
         "kernel.comp",

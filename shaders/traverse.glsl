@@ -37,5 +37,8 @@ void surface_corners(uint instance, uint primitive, out vec3 a, out vec3 b, out 
 #ifdef TRAVERSE_RECALL
 #include "traverse_recall.glsl"
 #endif
+#ifdef TRAVERSE_NOTHING
+#include "traverse_nothing.glsl"
+#endif
 
 #endif

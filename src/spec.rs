@@ -344,6 +344,11 @@ pub(crate) mod kernels {
     ];
     pub(crate) const REPLAY_QUERY: [Kernel; 2] =
         [kernel!("replay_query"), kernel!("replay_query_addresses")];
+    /// Reads them and traces nothing.
+    pub(crate) const REPLAY_NOTHING: [Kernel; 2] = [
+        kernel!("replay_nothing"),
+        kernel!("replay_nothing_addresses"),
+    ];
     pub(crate) const REPLAY_PIPELINE: Kernel = kernel!("replay_pipeline");
     pub(crate) const PROBE_SOFTWARE: Kernel = kernel!("probe_software");
     pub(crate) const PROBE_QUERY: Kernel = kernel!("probe_query");

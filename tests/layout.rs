@@ -19,7 +19,7 @@ use etendue::spec::Spec;
 use spirv::Module;
 
 /// The kernels that render and probe; test kernels have bindings of their own.
-const KERNELS: [&str; 10] = [
+const KERNELS: [&str; 11] = [
     "path_software",
     "path_query",
     "path_pipeline",
@@ -28,6 +28,7 @@ const KERNELS: [&str; 10] = [
     "probe_pipeline",
     "path_record",
     "replay_software",
+    "replay_nothing",
     "photon_software",
     "trace_any_hit",
 ];

@@ -73,6 +73,13 @@ impl Stream {
         self.rays.len()
     }
 
+    /// How many of them met something.
+    #[must_use]
+    pub fn rays_met(&self) -> usize {
+        let met = self.rays.iter().filter(|ray| ray.primitive != layout::NONE);
+        met.count()
+    }
+
     /// Whether there is none.
     #[must_use]
     pub fn is_empty(&self) -> bool {

@@ -197,6 +197,7 @@ impl Traversal {
             (Self::Software { .. }, Study::Record) => kernels::PATH_RECORD,
             (Self::Software { .. }, Study::Recall) => kernels::PATH_RECALL[address],
             (Self::Software { .. }, Study::Replay) => kernels::REPLAY_SOFTWARE[address],
+            (Self::Software { .. }, Study::Read) => kernels::REPLAY_NOTHING[address],
             (Self::Query { .. }, Study::Replay) => kernels::REPLAY_QUERY[address],
             (Self::Pipeline { .. }, Study::Replay) => kernels::REPLAY_PIPELINE,
             (Self::Software { .. }, _) if spec.shares() => kernels::SHARE_SOFTWARE[address],

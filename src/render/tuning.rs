@@ -21,7 +21,7 @@ pub struct Tuning {
     /// Whether a small tree of our own lies in uniform buffers; `None`: on CPUs, which read them faster. Never where
     /// kernels read by addresses.
     pub small: Option<bool>,
-    /// Whether kernels read the scene's arrays by their addresses, where the device can; `None`: on CPUs that gather.
+    /// Whether kernels read the scene's arrays by their addresses, where the device can; `None`: on CPUs that gather fast.
     pub addresses: Option<bool>,
     /// Whether the device's own structures hold boxes, and shaders test the triangles in them; `None`: on CPUs, whose
     /// own test has gaps at edges.
@@ -47,12 +47,14 @@ pub enum Study {
     Recall,
     /// Traces recorded rays, by any traversal, and renders nothing.
     Replay,
+    /// Reads recorded rays, and neither traces them nor renders.
+    Read,
 }
 
 impl Study {
     /// Whether the kernel reads or writes rays.
     pub(super) fn has_stream(self) -> bool {
-        matches!(self, Self::Record | Self::Recall | Self::Replay)
+        !matches!(self, Self::None | Self::Counts)
     }
 }
 

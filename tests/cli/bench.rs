@@ -75,7 +75,7 @@ fn a_tiny_bench_is_measured_and_drawn() {
         assert!((0.0..=1.0).contains(&number("lane_use")), "{limit}");
         assert!(number("lane_use") > 0.1, "{limit}");
         assert!(number("bandwidth") > 1e8, "{limit}");
-        for part in ["shading", "replay", "sorted", "ray_query"] {
+        for part in ["shading", "replay", "sorted", "reading", "ray_query"] {
             assert!(number(&format!("seconds_{part}")) > 0.0, "{limit}");
         }
         assert!(

@@ -86,6 +86,10 @@ fn a_replay_meets_what_the_render_met() {
                 assert_eq!(replayed.rays, rays, "{name}: rays of a replay");
                 assert_eq!(replayed.different, 0, "{name}: what they meet");
             }
+            // the same rays, of which none meets anything
+            let met = stream.rays_met() as u64;
+            let read = study(Study::Read, Some(&stream)).counts;
+            assert_eq!((read.rays, read.different), (rays, met), "{name}");
         }
     }
 }

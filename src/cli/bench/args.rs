@@ -98,13 +98,17 @@ impl WayName {
         }
     }
 
+    pub fn estimator(self) -> Estimator {
+        match self {
+            Self::Full | Self::Adaptive | Self::Shared => Estimator::Full,
+            Self::Textbook => Estimator::Textbook,
+        }
+    }
+
     /// Settings of renders this way.
     pub fn settings(self, settings: &Settings) -> Settings {
         Settings {
-            estimator: match self {
-                Self::Full | Self::Adaptive | Self::Shared => Estimator::Full,
-                Self::Textbook => Estimator::Textbook,
-            },
+            estimator: self.estimator(),
             adaptive: self == Self::Adaptive,
             share: self == Self::Shared,
             ..settings.clone()

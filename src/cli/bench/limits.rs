@@ -1,7 +1,8 @@
 //! The limit report: where the time of our own tree goes, and how far the machine is from its limits.
 //!
 //! The rays of a pass are recorded with what they met. Then the same pass is rendered as always; without traversal, what
-//! rays meet being looked up; and its rays are traced alone: in their order, sorted, and by the device's ray query.
+//! rays meet being looked up; and its rays are traced alone: in their order, sorted, and by the device's ray query. What
+//! reading them takes by itself is measured by a kernel that traces none.
 
 use std::hint::black_box;
 use std::path::Path;
@@ -77,6 +78,7 @@ pub fn run(
         holding(BackendChoice::Bvh, Study::Recall, &stream)?,
         holding(BackendChoice::Bvh, Study::Replay, &stream)?,
         holding(BackendChoice::Bvh, Study::Replay, &stream.sorted())?,
+        holding(BackendChoice::Bvh, Study::Read, &stream)?,
     ];
     match holding(BackendChoice::RayQuery, Study::Replay, &stream) {
         Ok(query) => kernels.push(query),
@@ -127,7 +129,7 @@ fn line(
     counts: TraversalCounts,
     bandwidth: f64,
 ) -> Result<Limit, Failure> {
-    let [plain, shading, replay, sorted, query @ ..] = passes else {
+    let [plain, shading, replay, sorted, reading, query @ ..] = passes else {
         unreachable!("every round has these");
     };
     let different = replay.counts.different + sorted.counts.different;
@@ -146,6 +148,7 @@ fn line(
         seconds_shading: shading.seconds,
         seconds_replay: replay.seconds,
         seconds_sorted: sorted.seconds,
+        seconds_reading: Some(reading.seconds),
         seconds_ray_query: query.map(|pass| pass.seconds),
         different_ray_query: query.map(|pass| pass.counts.different),
         rays: counts.rays,

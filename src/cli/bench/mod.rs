@@ -22,7 +22,7 @@ use std::time::Instant;
 use etendue::image_io::probe_writable;
 use etendue::render::{DeviceOptions, Renderer};
 use etendue::scene::Scene;
-use etendue::settings::Settings;
+use etendue::settings::{Estimator, Settings};
 
 use super::failure::{FAILED, Failure, Outcome, USAGE};
 use super::render::load_scene;
@@ -73,9 +73,19 @@ pub fn run(args: &BenchArgs) -> Result<Outcome, Failure> {
         contest.run(&peers, &mut out)?;
         out.note(&format!("{}: rates", scene_name(path)));
         let rounds = args.seeds;
-        rates::run(
-            path, scene, &settings, &options, rounds, &device.0, &mut out,
-        )?;
+        for estimator in [Estimator::Full, Estimator::Textbook] {
+            let ways = &args.estimators;
+            if !ways.iter().any(|way| way.estimator() == estimator) {
+                continue;
+            }
+            let settings = Settings {
+                estimator,
+                ..settings.clone()
+            };
+            rates::run(
+                path, scene, &settings, &options, rounds, &device.0, &mut out,
+            )?;
+        }
         if args.limits {
             out.note(&format!("{}: limits", scene_name(path)));
             limits::run(path, scene, &settings, &options, rounds, &mut out)?;

@@ -1,10 +1,10 @@
-//! How fast each traversal of the device is.
+//! How fast each traversal of the device is, with each estimator that takes part.
 
 use std::path::Path;
 
 use etendue::render::{DeviceOptions, Renderer, Tuning, devices};
 use etendue::scene::Scene;
-use etendue::settings::{Estimator, Settings};
+use etendue::settings::Settings;
 
 use super::super::failure::Failure;
 use super::contender::{render_all, warm_up};
@@ -14,7 +14,8 @@ use super::{Output, scene_name};
 /// Samples a pixel of a round.
 const SPP: u64 = 16;
 
-/// Renders in rounds, every traversal that the device offers once a round; it is said what the others lack.
+/// Renders in rounds by the estimator of the settings, every traversal that the device offers once a round; it is said what
+/// the others lack.
 pub fn run(
     path: &Path,
     scene: &Scene,
@@ -24,6 +25,7 @@ pub fn run(
     device: &str,
     out: &mut Output,
 ) -> Result<(), Failure> {
+    let estimator = settings.estimator;
     let name = scene_name(path);
     let mut renderers = Vec::new();
     let this = devices()?.into_iter().find(|info| info.name == device);
@@ -38,7 +40,6 @@ pub fn run(
         };
         let settings = Settings {
             backend,
-            estimator: Estimator::Full,
             ..settings.clone()
         };
         let renderer = match support {
@@ -69,7 +70,7 @@ pub fn run(
             out.line(&Line::Rate(Rate {
                 scene: name.clone(),
                 backend: backend.name().to_owned(),
-                estimator: Estimator::Full.name().to_owned(),
+                estimator: estimator.name().to_owned(),
                 round,
                 spp: SPP,
                 seconds,

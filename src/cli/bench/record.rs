@@ -185,6 +185,9 @@ pub struct Limit {
     pub seconds_replay: f64,
     /// … sorted, …
     pub seconds_sorted: f64,
+    /// … only read, not traced (earlier files lack it), …
+    #[serde(default)]
+    pub seconds_reading: Option<f64>,
     /// … and by the device's ray query; absent where it has none.
     pub seconds_ray_query: Option<f64>,
     /// Rays that met something else there.
@@ -202,6 +205,19 @@ pub struct Limit {
     pub lane_use: f64,
     /// Bytes a second that this machine's processors read from memory in order.
     pub bandwidth: f64,
+}
+
+impl Limit {
+    /// Seconds of traversal by itself: what reading the rays takes is no part of it.
+    pub fn seconds_traversal(&self) -> f64 {
+        self.seconds_replay - self.seconds_reading.unwrap_or(0.0)
+    }
+
+    /// How much faster our own tree traverses than the device's ray query.
+    pub fn over_ray_query(&self) -> Option<f64> {
+        let query = self.seconds_ray_query? - self.seconds_reading.unwrap_or(0.0);
+        Some(query / self.seconds_traversal())
+    }
 }
 
 /// A step of a growth sweep.

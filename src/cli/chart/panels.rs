@@ -77,7 +77,15 @@ pub fn errors(lines: &[Line]) -> Vec<Panel> {
     scenes.into_iter().map(panel).collect()
 }
 
-/// Bars of paths and of rays a second for each scene and backend.
+/// The backend, and the estimator where it is not the full one.
+fn rate_name(rate: &Rate) -> String {
+    match rate.estimator.as_str() {
+        "full" => rate.backend.clone(),
+        estimator => format!("{}, {estimator}", rate.backend),
+    }
+}
+
+/// Bars of paths and of rays a second for each scene, backend and estimator.
 pub fn rates(lines: &[Line]) -> Vec<Panel> {
     let rates: Vec<&Rate> = lines
         .iter()
@@ -90,19 +98,19 @@ pub fn rates(lines: &[Line]) -> Vec<Panel> {
         return Vec::new();
     }
     let panel = |title: &str, value: fn(&Rate) -> f64| {
-        let keys = distinct(rates.iter().map(|r| (r.scene.as_str(), r.backend.as_str())));
+        let keys = distinct(rates.iter().map(|r| (r.scene.as_str(), rate_name(r))));
         let scenes = distinct(keys.iter().map(|k| k.0));
         let keys = scenes
             .iter()
             .flat_map(|scene| keys.iter().filter(move |k| k.0 == *scene));
-        let bars = keys.map(|&(scene, backend)| {
+        let bars = keys.map(|(scene, name)| {
             let own = rates
                 .iter()
-                .filter(|r| r.scene == scene && r.backend == backend);
+                .filter(|r| r.scene == *scene && rate_name(r) == *name);
             let values: Vec<f64> = own.map(|r| value(r) / 1e6).collect();
             Bar {
-                group: scene.to_owned(),
-                name: backend.to_owned(),
+                group: (*scene).to_owned(),
+                name: name.clone(),
                 value: quantile(&values, 0.5),
                 low: quantile(&values, BAND.0),
                 high: quantile(&values, BAND.1),
@@ -132,7 +140,7 @@ pub fn limit_lines(lines: &[Line]) -> Vec<&Limit> {
 type Part = (&'static str, fn(&Limit) -> f64);
 const PARTS: [Part; 2] = [
     ("traversal: its rays alone", |l| {
-        l.seconds_replay / l.seconds
+        l.seconds_traversal() / l.seconds
     }),
     ("shading: what rays meet is known", |l| {
         l.seconds_shading / l.seconds

@@ -96,12 +96,15 @@ pub fn rates(lines: &[Line]) -> Table {
             _ => None,
         })
         .collect();
-    let keys = distinct(all.iter().map(|r| (r.scene.as_str(), r.backend.as_str())));
-    let row = |&(scene, backend): &(&str, &str)| {
+    let keys = distinct(
+        all.iter()
+            .map(|r| (r.scene.as_str(), r.estimator.as_str(), r.backend.as_str())),
+    );
+    let row = |&(scene, estimator, backend): &(&str, &str, &str)| {
         let of = |backend: &str| -> Vec<(u64, f64)> {
             let own = all
                 .iter()
-                .filter(|r| r.scene == scene && r.backend == backend);
+                .filter(|r| r.scene == scene && r.estimator == estimator && r.backend == backend);
             own.map(|r| (r.round, r.rays_per_second)).collect()
         };
         let (own, base) = (of(backend), of(BASE_BACKEND));
@@ -118,7 +121,7 @@ pub fn rates(lines: &[Line]) -> Table {
             ],
             false => Default::default(),
         };
-        let mut row = vec![scene.to_owned(), backend.to_owned()];
+        let mut row = [scene, estimator, backend].map(str::to_owned).to_vec();
         row.push(plain(quantile(&rates, 0.5)));
         row.extend(ratio);
         row
@@ -127,12 +130,13 @@ pub fn rates(lines: &[Line]) -> Table {
         title: "Rates of the traversals",
         head: vec![
             "scene",
+            "estimator",
             "traversal",
             "Mrays/s",
             "over ray query",
             "over the rounds",
         ],
-        texts: 2,
+        texts: 3,
         rows: keys.iter().map(row).collect(),
     }
 }
@@ -140,13 +144,13 @@ pub fn rates(lines: &[Line]) -> Table {
 /// Where the time goes, and how far the machine is from its limits.
 pub fn limits(lines: &[Line]) -> Table {
     let all = panels::limit_lines(lines);
-    let query = |scene: &str| {
+    // of what not every line has
+    let median_of = |scene: &str, f: &dyn Fn(&Limit) -> Option<f64>| {
         let own = all.iter().filter(|l| l.scene == scene);
-        let ratio = |l: &&Limit| Some(l.seconds_ray_query? / l.seconds_replay);
-        let ratios: Vec<f64> = own.filter_map(ratio).collect();
-        match ratios.is_empty() {
+        let values: Vec<f64> = own.filter_map(|l| f(l)).collect();
+        match values.is_empty() {
             true => String::from("–"),
-            false => plain(quantile(&ratios, 0.5)),
+            false => plain(quantile(&values, 0.5)),
         }
     };
     let row = |scene: &str| {
@@ -155,17 +159,18 @@ pub fn limits(lines: &[Line]) -> Table {
             own.map(|l| f(l)).collect()
         };
         let median = |f: &dyn Fn(&Limit) -> f64| plain(quantile(&of(f), 0.5));
-        let shares = of(&|l| 100.0 * l.seconds_replay / l.seconds);
+        let shares = of(&|l| 100.0 * l.seconds_traversal() / l.seconds);
         let loads = |l: &Limit| l.rays_per_second * l.bytes_per_ray;
         vec![
             scene.to_owned(),
             plain(quantile(&shares, 0.5)),
             range((quantile(&shares, 0.0), quantile(&shares, 1.0))),
             median(&|l| 100.0 * l.seconds_shading / l.seconds),
+            median_of(scene, &|l| Some(100.0 * l.seconds_reading? / l.seconds)),
             median(&|l| l.rays_per_second / 1e6),
-            median(&|l| l.rays as f64 / l.seconds_replay / 1e6),
+            median(&|l| l.rays as f64 / l.seconds_traversal() / 1e6),
             median(&|l| l.seconds_replay / l.seconds_sorted),
-            query(scene),
+            median_of(scene, &|l| l.over_ray_query()),
             median(&|l| l.nodes_per_ray),
             median(&|l| l.records_per_ray),
             median(&|l| l.bytes_per_ray),
@@ -182,6 +187,7 @@ pub fn limits(lines: &[Line]) -> Table {
             "traversal (rays alone), % of time",
             "over the rounds",
             "shading (hits known), %",
+            "reading of rays, %",
             "Mrays/s",
             "Mrays/s alone",
             "sorted over unsorted",
