@@ -124,18 +124,21 @@ const vec3 CANDIDATE_TURNS = vec3(5184444.0, 6332377.0, 4780167.0) / 8388608.0;
 // Samples of lights of which one is followed. What the tree does not know, the BSDF's lobes, matters most where the camera sees it.
 int direct_candidates(bool is_first)
 {
+    if (!HAS_LIGHT_TREE) {
+        return 1;
+    }
     return HAS_SPECULAR && is_first ? 4 : 2;
 }
 
-// Direct light by one sample of a light, which a surface scatters along wo, in the frame, for throughput one.
-DirectLight direct_sample(SurfacePoint s, Bsdf bsdf, mat3 frame, vec3 wo, LightView view, vec4 u)
+// Direct light by one of `count` samples of lights, which a surface scatters along wo, in the frame, for throughput one.
+DirectLight direct_sample(SurfacePoint s, Bsdf bsdf, mat3 frame, vec3 wo, LightView view, vec4 u, int count)
 {
     DirectLight direct = DirectLight(light_sample(s.position, view, u), vec3(0.0), s.position);
     LightSample light = direct.light;
     float side = dot(light.wi, s.ng);
     if (light.pdf > 0.0 && (side > 0.0 || (bsdf_transmits_widely(bsdf) && side < 0.0))) {
         BsdfValue value = bsdf_eval(bsdf, wo, light.wi * frame);
-        float weight = direct_light_weight(light.is_delta, light.pdf, value.pdf);
+        float weight = direct_light_weight(light.is_delta, float(count) * light.pdf, value.pdf);
         direct.value = (weight / light.pdf) * value.f_cos * light.radiance;
     }
     return direct;
@@ -147,10 +150,10 @@ DirectLight direct_on_surface(SurfacePoint s, Bsdf bsdf, mat3 frame, vec3 wo, uv
 {
     LightView view = light_view_surface(s.position, direct_normal(s, bsdf));
     vec4 u = rng_uniform(key, event, SLOT_LIGHT);
-    if (!HAS_LIGHT_TREE) {
-        return direct_sample(s, bsdf, frame, wo, view, u);
-    }
     int count = direct_candidates(is_first);
+    if (count == 1) {
+        return direct_sample(s, bsdf, frame, wo, view, u, count);
+    }
     vec4 turn = vec4(1.0 / float(count), CANDIDATE_TURNS);
     float coin = rng_coin(key, event, SLOT_CANDIDATE);
     float sum = 0.0;
@@ -158,7 +161,7 @@ DirectLight direct_on_surface(SurfacePoint s, Bsdf bsdf, mat3 frame, vec3 wo, uv
     direct.light.wi = s.ng;
     direct.value = vec3(0.0);
     for (int k = 0; k < count; k++) {
-        DirectLight candidate = direct_sample(s, bsdf, frame, wo, view, u);
+        DirectLight candidate = direct_sample(s, bsdf, frame, wo, view, u, count);
         u = sample_turned(u, turn);
         float weight = candidate.value.x + candidate.value.y + candidate.value.z;
         if (weight != 0.0) {

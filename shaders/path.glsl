@@ -156,7 +156,10 @@ float path_found_weight(PathState path, float pdf_light, vec3 point, bool is_inf
     if (HAS_EQUIANGULAR && !is_infinite && path.flight.pdf > 0.0) {
         return direct_found_weight(path.flight, path.pdf, pdf_light, point);
     }
-    return direct_bsdf_weight(path.pdf, pdf_light);
+    // one of several samples of lights counts for all of them
+    bool is_medium = HAS_SCATTERING && path.flight.pdf > 0.0;
+    float count = is_medium ? 1.0 : float(direct_candidates(path.depth <= 1u));
+    return direct_bsdf_weight(path.pdf, count * pdf_light);
 }
 
 // What direct light was chosen for at the last scattering.

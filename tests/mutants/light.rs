@@ -377,6 +377,13 @@ pub const MUTANTS: &[Mutant] = &[
         killers: &["integrator::lamps::lamps_of_many_shapes"],
     },
     Mutant {
+        name: "candidate-count",
+        wrong: "where scattering found the emitter, one of several samples of lights counts for one",
+        file: "shaders/path.glsl",
+        edits: &[("count * pdf_light", "pdf_light")],
+        killers: &["integrator::lamps::lamps_of_many_shapes"],
+    },
+    Mutant {
         name: "candidate-share",
         wrong: "of several samples of lights any is followed, not in proportion to what it gives",
         file: "shaders/direct.glsl",
