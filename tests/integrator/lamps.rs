@@ -151,3 +151,32 @@ fn points_of_light_add_up() {
         }
     }
 }
+
+/// Walls that shine alike all around: a matt square sends on its part of their radiance. Direct light and scattering find them
+/// about as often, so weights that do not add up to one are seen.
+#[test]
+fn walls_of_lamps_are_counted_once() {
+    let mut scene = empty();
+    add(&mut scene, square(Vec3::ZERO, Vec3::Y, 0.3), lambert(0.5));
+    for wall in [Vec3::X, Vec3::Y, Vec3::Z] {
+        for normal in [wall, -wall] {
+            add(
+                &mut scene,
+                square(-2.0 * normal, normal, 2.0),
+                emitter(0.0, 1.0),
+            );
+        }
+    }
+    scene.cameras = vec![parallel(DVec3::Y, DVec3::ZERO, 1e-2)];
+    // out of sight: where anything is no Lambert surface, more samples are drawn
+    let mut shiny = scene.clone();
+    let outside = square(Vec3::new(0.0, -9.0, 0.0), Vec3::Y, 0.3);
+    add(&mut shiny, outside, metal(0.8, 0.4));
+    for (name, scene) in [("matt", scene), ("shiny", shiny)] {
+        let Some(r) = render(&scene, &settings(8, 1024), Tuning::default()) else {
+            return;
+        };
+        let seen = Estimate::of_film(&r.film, &[0, 1, 2]);
+        seen.assert_is(name, 0.5, 5e-3);
+    }
+}

@@ -381,7 +381,7 @@ pub const MUTANTS: &[Mutant] = &[
         wrong: "where scattering found the emitter, one of several samples of lights counts for one",
         file: "shaders/path.glsl",
         edits: &[("count * pdf_light", "pdf_light")],
-        killers: &["integrator::lamps::lamps_of_many_shapes"],
+        killers: &["integrator::lamps::walls_of_lamps_are_counted_once"],
     },
     Mutant {
         name: "candidate-share",
