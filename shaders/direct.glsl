@@ -203,12 +203,12 @@ LightView direct_view(Flight flight)
     return LightView(flight.origin, flight.direction, flight.end);
 }
 
-// Direct light that a point in a medium scatters back along the flight, for throughput one.
-DirectLight direct_in_medium(Medium medium, Flight flight, vec4 u)
+// Direct light of the chosen emitter that a point in a medium scatters back along the flight, for throughput one.
+DirectLight direct_in_medium(Medium medium, Flight flight, LightChoice choice, vec4 u)
 {
     DirectLight direct;
     direct.at = flight.origin + flight.distance * flight.direction;
-    direct.light = light_sample(direct.at, direct_view(flight), u);
+    direct.light = light_from(choice, direct.at, u);
     float phase = phase_value(medium, flight.direction, direct.light.wi);
     float weight = direct_light_weight(direct.light.is_delta, direct.light.pdf, phase);
     if (HAS_EQUIANGULAR && !direct.light.is_infinite && weight > 0.0) {
@@ -222,11 +222,10 @@ DirectLight direct_in_medium(Medium medium, Flight flight, vec4 u)
 }
 
 // The same for a distance that is drawn by the angle at which a light sees the segment, for throughput one at its origin.
-DirectLight direct_along(Medium medium, Flight flight, vec4 u, float u_distance)
+DirectLight direct_along(Medium medium, Flight flight, LightChoice choice, vec4 u, float u_distance)
 {
     // The same numbers are the same point of the light from anywhere.
     DirectLight direct;
-    LightChoice choice = light_choose(direct_view(flight), u);
     direct.light = light_from(choice, flight.origin, u);
     direct.value = vec3(0.0);
     direct.at = flight.origin;

@@ -12,6 +12,10 @@
 
 // What the choice errs on the generous side by, in cosines: bounds are rounded.
 const float CLUSTER_SLACK = 1.0e-3;
+// The square of how much closer than its start a segment passes at most by a light, relative …
+const float CLOSE = 1.0e-8;
+// … and the longest that is told from longer ones, metres: the squares of more overflow.
+const float SEGMENT_MOST = 1.0e12;
 
 // Where light is asked for: a point of a surface, or a segment in a medium, whose light may be scattered anywhere on it.
 struct LightView {
@@ -52,31 +56,77 @@ float light_cosine_bound(vec2 angle, vec2 reach)
     return max(light_angle_beyond(angle, reach).x + CLUSTER_SLACK, 0.0);
 }
 
-// In proportion to the most that the cluster in two texels can give at the view.
-float light_importance(uvec4 sphere, uvec4 cone, LightView view)
+// The most that a cluster sends to where `cosine` is that of the angle with its axis, as part of its intensity.
+float light_cone_bound(uvec4 cone, float cosine, vec2 reach)
+{
+    vec2 beyond = light_angle_beyond(light_angle(cosine), light_angle(uintBitsToFloat(cone.y)));
+    bool is_dark = uintBitsToFloat(cone.z) < 0.0 && light_angle_beyond(beyond, reach).x < 1.0;
+    return is_dark ? 0.0 : light_cosine_bound(beyond, reach);
+}
+
+// The largest cosine between `axis` and a direction from a light to a segment, whose line is `apart` from it at the
+// closest and which goes from x.x to x.y metres from there.
+float light_segment_cosine(vec3 axis, vec3 apart, vec3 direction, vec2 x)
+{
+    // (a + b x) / √(c + x²) has one extremum, the largest value if a > 0
+    float a = dot(axis, apart);
+    float b = dot(axis, direction);
+    float c = dot(apart, apart);
+    vec2 at = a > 0.0 ? vec2(clamp(b * c / a, x.x, x.y)) : x;
+    vec2 cosines = (a + b * at) * inversesqrt(c + at * at);
+    return max(cosines.x, cosines.y);
+}
+
+// In proportion to the most that the cluster in two texels can give at a point of a surface.
+float light_surface_importance(uvec4 sphere, uvec4 cone, LightView view)
 {
     vec3 to = uintBitsToFloat(sphere.xyz) - view.origin;
-    bool is_segment = HAS_SCATTERING && view.end >= 0.0;
-    if (is_segment) {
-        to -= clamp(dot(to, view.direction), 0.0, view.end) * view.direction;
-    }
     float radius2 = square(uintBitsToFloat(sphere.w));
     float distance2 = dot(to, to);
-    float cosine_cone = uintBitsToFloat(cone.y);
     float cosines = 1.0;
-    if (distance2 > radius2 && !is_segment) {
+    if (distance2 > radius2) {
         to *= inversesqrt(distance2);
         float sine2 = radius2 / distance2;
         vec2 reach = vec2(sqrt(1.0 - sine2), sqrt(sine2));
-        if (cosine_cone > -1.0) {
-            vec2 angle = light_angle_beyond(light_angle(-dot(light_axis(cone.x), to)), light_angle(cosine_cone));
-            cosines = light_cosine_bound(angle, reach);
+        if (uintBitsToFloat(cone.y) > -1.0) {
+            cosines = light_cone_bound(cone, -dot(light_axis(cone.x), to), reach);
         }
         if (!HAS_DIELECTRIC || view.direction != vec3(0.0)) {
             cosines *= light_cosine_bound(light_angle(dot(view.direction, to)), reach);
         }
     }
-    return uintBitsToFloat(cone.z) * cosines / max(distance2, radius2);
+    return abs(uintBitsToFloat(cone.z)) * cosines / max(distance2, radius2);
+}
+
+// The same for a segment as a whole, over which 1/distance² is summed: by its smallest distance alone, what passes
+// close by one light would hardly ever see the others.
+float light_segment_importance(uvec4 sphere, uvec4 cone, LightView view)
+{
+    vec3 to = uintBitsToFloat(sphere.xyz) - view.origin;
+    // lines that pass closer are not told apart
+    float radius2 = max(square(uintBitsToFloat(sphere.w)), CLOSE * dot(to, to));
+    float along = dot(to, view.direction);
+    vec3 apart = along * view.direction - to;
+    vec2 x = vec2(-along, min(view.end, SEGMENT_MOST) - along);
+    float apart2 = dot(apart, apart);
+    float distance2 = apart2 + square(max(max(x.x, -x.y), 0.0));
+    float cosines = 1.0;
+    if (distance2 > radius2 && uintBitsToFloat(cone.y) > -1.0) {
+        float sine2 = radius2 / distance2;
+        vec2 reach = vec2(sqrt(1.0 - sine2), sqrt(sine2));
+        cosines = light_cone_bound(cone, light_segment_cosine(light_axis(cone.x), apart, view.direction, x), reach);
+    }
+    // ∫ dx / (c + x²) = 2 atan(t) / √c, where t = span √c / (√((c + x₀²) (c + x₁²)) + c + x₀ x₁); 2 t / (1 + 2 t / π) for 2 atan t
+    float c = max(apart2, radius2);
+    float span = x.y - x.x;
+    float around = sqrt((c + x.x * x.x) * (c + x.y * x.y)) + c + x.x * x.y;
+    return abs(uintBitsToFloat(cone.z)) * cosines * span / (around + 2.0 / PI * span * sqrt(c));
+}
+
+float light_importance(uvec4 sphere, uvec4 cone, LightView view)
+{
+    bool is_segment = HAS_SCATTERING && view.end >= 0.0;
+    return is_segment ? light_segment_importance(sphere, cone, view) : light_surface_importance(sphere, cone, view);
 }
 
 // Importance of both children of a node, and their links.

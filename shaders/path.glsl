@@ -7,6 +7,7 @@
 // Light through refracting interfaces is found by the path alone.
 //
 // [Kajiya86] Kajiya, The Rendering Equation.
+// [Talbot05] Talbot, Cline, Egbert, Importance Resampling for Global Illumination.
 // [Veach97] §5.2 (n² and radiance), §9 (multiple importance sampling), §10.4 (roulette).
 
 #ifndef PATH_GLSL
@@ -80,21 +81,30 @@ bool path_survives(inout PathState path, float weight, float u)
     return true;
 }
 
-// Adds direct light that is scattered at `origin`, now or when its shadow ray has arrived.
+// Adds direct light that is scattered at `origin`, now or when its shadow ray has arrived. Of light along a segment and light
+// at its end one is followed, in proportion to what they give if nothing is in the way, for both [Talbot05].
 void path_light(inout PathState path, inout PathResult result, Interior interior, vec3 origin, uint from, LightSample light,
                 vec3 value)
 {
+    float weight = value.x + value.y + value.z;
     // What is not a number goes on, and is counted with its sample.
-    if (value.x + value.y + value.z <= 0.0) {
+    if (weight <= 0.0) {
         return;
     }
+    if (HAS_EQUIANGULAR && path.shadow.is_waiting) {
+        float other = path.shadow.value.x + path.shadow.value.y + path.shadow.value.z;
+        float share = weight / (other + weight);
+        if (rng_coin(path.key, path.event, SLOT_SEGMENT) >= share) {
+            path.shadow.value /= 1.0 - share;
+            return;
+        }
+        value /= share;
+    }
     Shadow shadow = shadow_of(interior, origin, from, light, value);
-    if (!HAS_PASSAGE) {
-        result.radiance += shadow_arrives(shadow, result.rays);
-    } else if (path.shadow.is_waiting) {
-        path.next_shadow = shadow;
-    } else {
+    if (HAS_PASSAGE || HAS_SCATTERING) {
         path.shadow = shadow;
+    } else {
+        result.radiance += shadow_arrives(shadow, result.rays);
     }
 }
 
@@ -111,8 +121,13 @@ bool path_scatter(inout PathState path, inout PathResult result, float end)
     vec4 u = rng_uniform(path.key, path.event, SLOT_MEDIUM);
     vec3 d = path.ray.direction;
     Flight flight = Flight(path.ray.origin - path.lead * d, d, end, medium_channels(path.beta), 0.0, 0.0);
+    vec4 u_light = rng_uniform(path.key, path.event, SLOT_SEGMENT);
+    LightChoice choice;
+    if (HAS_LIGHTS && !is_last) {
+        choice = light_choose(direct_view(flight), u_light);
+    }
     if (HAS_EQUIANGULAR && !is_last) {
-        DirectLight direct = direct_along(medium, flight, rng_uniform(path.key, path.event, SLOT_SEGMENT), u.z);
+        DirectLight direct = direct_along(medium, flight, choice, u_light, u.z);
         path_light(path, result, path.interior, direct.at, NONE, direct.light, path.scale * path.beta * direct.value);
     }
     MediumSample s = medium_sample(medium, path.beta, end, u.xy);
@@ -129,7 +144,7 @@ bool path_scatter(inout PathState path, inout PathResult result, float end)
     flight.pdf = medium_pdf(medium, flight.channels, s.distance);
     vec3 at = flight.origin + s.distance * d;
     if (HAS_LIGHTS) {
-        DirectLight direct = direct_in_medium(medium, flight, rng_uniform(path.key, path.event, SLOT_LIGHT));
+        DirectLight direct = direct_in_medium(medium, flight, choice, u_light);
         path_light(path, result, path.interior, at, NONE, direct.light, path.scale * path.beta * direct.value);
     }
 
@@ -196,7 +211,7 @@ PathState path_start(uvec4 key, uvec2 pixel)
     path.is_search = HAS_INSIDE;
     path.search = interior_search();
     path.camera = ray;
-    path.shadow = path.next_shadow = shadow_none();
+    path.shadow = shadow_none();
     return path;
 }
 
@@ -235,8 +250,7 @@ void path_shadow(inout PathState path, inout PathResult result, bool is_hit, Sur
     }
     if (is_done) {
         result.radiance += path.shadow.value;
-        path.shadow = path.next_shadow;
-        path.next_shadow.is_waiting = false;
+        path.shadow.is_waiting = false;
     }
 }
 
@@ -353,7 +367,7 @@ void path_surface(inout PathState path, inout PathResult result, SurfacePoint s,
 
 // Traces one ray of the path, of direct light or of the search for solids that hold
 // the camera, so that the code that meets surfaces is there once.
-void path_step(inout PathState path, inout PathResult result)
+void path_trace(inout PathState path, inout PathResult result)
 {
     bool is_shadow = HAS_PASSAGE && path.shadow.is_waiting;
     Ray ray = path.ray;
@@ -444,6 +458,16 @@ void path_step(inout PathState path, inout PathResult result)
         path_shadow(path, result, is_hit, s, through, boundary.beyond);
     } else {
         path_surface(path, result, s, is_solid, boundary, frame, bsdf);
+    }
+}
+
+// Takes the path one step on. Where media scatter, the step's direct light is traced here, whether air or a surface scatters it.
+void path_step(inout PathState path, inout PathResult result)
+{
+    path_trace(path, result);
+    if (HAS_SCATTERING && !HAS_PASSAGE && path.shadow.is_waiting) {
+        path.shadow.is_waiting = false;
+        result.radiance += shadow_arrives(path.shadow, result.rays);
     }
 }
 

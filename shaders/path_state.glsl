@@ -46,9 +46,7 @@ struct PathState {
     bool is_search;
     InteriorSearch search;
     Ray camera;            // the ray of the path when the search is over
-    // With HAS_PASSAGE: direct light that is on its way, and more that waits for it.
-    Shadow shadow;
-    Shadow next_shadow;
+    Shadow shadow;         // with HAS_PASSAGE or HAS_SCATTERING: direct light that is on its way
 };
 
 PathResult path_result()

@@ -22,6 +22,8 @@ const MOST: usize = 1 << 22;
 /// What single precision and the packed axis may be off, relative and in cosines.
 const ROUNDING: f64 = 1e-5;
 const AXIS_ROUNDING: f64 = 1e-3;
+/// Narrower spots count as this wide, steradians.
+const LEAST_LIT: f64 = 1e-6;
 
 /// The tree as kernels read it.
 #[derive(Default)]
@@ -44,12 +46,14 @@ struct Place {
     power: f64,
 }
 
-/// Directions about an axis.
+/// Directions about an axis: normals of emitters, or all that spots shine to.
 #[derive(Clone, Copy)]
 struct Cone {
     axis: DVec3,
     /// Of its half angle.
     cos: f64,
+    /// Nothing goes beyond it; else what does falls off as the cosine of the angle beyond.
+    is_sharp: bool,
 }
 
 /// What is known of several emitters.
@@ -74,13 +78,17 @@ impl Place {
         let light = &emitter.light;
         let at = DVec3::from(light.position.map(f64::from));
         if light.kind != layout::LIGHT_TRIANGLE {
-            let corners = [at; 3];
-            let (centre, power) = (at, emitter.power);
+            let axis = DVec3::from(light.direction.map(f64::from)).normalize_or_zero();
+            let has_cone = light.kind == layout::LIGHT_SPOT && axis != DVec3::ZERO;
             return Self {
-                corners,
-                centre,
-                cone: None,
-                power,
+                corners: [at; 3],
+                centre: at,
+                cone: has_cone.then(|| Cone {
+                    axis,
+                    cos: f64::from(light.cos_outer),
+                    is_sharp: true,
+                }),
+                power: emitter.power,
             };
         }
         let [a, b] = [light.edge1, light.edge2].map(|e| DVec3::from(e.map(f64::from)));
@@ -91,7 +99,11 @@ impl Place {
         Self {
             corners: [at, at + a, at + b],
             centre: at + (a + b) / 3.0,
-            cone: is_one_sided.then_some(Cone { axis, cos: 1.0 }),
+            cone: is_one_sided.then_some(Cone {
+                axis,
+                cos: 1.0,
+                is_sharp: false,
+            }),
             power: emitter.power,
         }
     }
@@ -107,8 +119,9 @@ impl Cone {
         };
         let (wide, narrow) = (a.cos.clamp(-1.0, 1.0).acos(), b.cos.clamp(-1.0, 1.0).acos());
         let between = a.axis.angle_between(b.axis);
+        let is_sharp = self.is_sharp && other.is_sharp;
         if between + narrow <= wide {
-            return Some(a);
+            return Some(Self { is_sharp, ..a });
         }
         let half = 0.5 * (wide + between + narrow);
         let normal = a.axis.cross(b.axis).normalize_or_zero();
@@ -119,6 +132,7 @@ impl Cone {
         Some(Self {
             axis,
             cos: half.cos(),
+            is_sharp,
         })
     }
 }
@@ -143,17 +157,32 @@ impl Bounds {
         }
     }
 
-    /// Power × size × solid angle lit [Conty18] Eq. 1.
-    fn cost(&self) -> f64 {
+    /// Solid angle that is lit, where what is beyond the cone counts by its cosine. [Conty18] Eq. 1
+    fn lit(&self) -> f64 {
         let angle = self.cone.map_or(PI, |c| c.cos.clamp(-1.0, 1.0).acos());
-        let reach = (angle + FRAC_PI_2).min(PI);
-        let lit = 2.0 * PI * (1.0 - angle.cos())
+        let beyond = match self.cone {
+            Some(cone) if cone.is_sharp => 0.0,
+            _ => FRAC_PI_2,
+        };
+        let reach = (angle + beyond).min(PI);
+        2.0 * PI * (1.0 - angle.cos())
             + FRAC_PI_2
                 * (2.0 * reach * angle.sin()
                     - (angle - 2.0 * reach).cos()
                     - 2.0 * angle * angle.sin()
-                    + angle.cos());
-        self.power * (self.high - self.low).length_squared() * lit
+                    + angle.cos())
+    }
+
+    /// Power × size × solid angle lit. [Conty18]
+    fn cost(&self) -> f64 {
+        self.power * (self.high - self.low).length_squared() * self.lit()
+    }
+
+    /// Power over the solid angle lit, negative where nothing goes beyond the cone.
+    fn intensity(&self) -> f64 {
+        let is_sharp = self.cone.is_some_and(|c| c.is_sharp);
+        let intensity = self.power / self.lit().max(LEAST_LIT);
+        if is_sharp { -intensity } else { intensity }
     }
 }
 
@@ -323,7 +352,7 @@ fn best_bin(
         .min_by(|a, b| a.0.total_cmp(&b.0))
 }
 
-/// What a parent knows of a child: a sphere, a cone, the power, and where it goes on.
+/// What a parent knows of a child: a sphere, a cone, the intensity, and where it goes on.
 fn texels(places: &[Place], members: &[usize], bounds: &Bounds, link: u32) -> [[u32; 4]; 2] {
     let centre = (0.5 * (bounds.low + bounds.high)).as_vec3();
     let radius = members
@@ -343,7 +372,7 @@ fn texels(places: &[Place], members: &[usize], bounds: &Bounds, link: u32) -> [[
         [
             octahedral(axis),
             (cos as f32).to_bits(),
-            (bounds.power as f32).to_bits(),
+            (bounds.intensity() as f32).to_bits(),
             link,
         ],
     ]

@@ -101,16 +101,16 @@ fn lamps_in_fog() {
     agree("lamps in fog", &scene, &plan, Tuning::default());
 }
 
-/// Irradiance of points of light, a spot and the sun on a white floor, in closed form.
+/// Irradiance of points of light, spots and the sun on a white floor, in closed form.
 #[test]
 fn points_of_light_add_up() {
     let mut scene = empty();
     add(&mut scene, square(Vec3::ZERO, Vec3::Y, 3.0), lambert(1.0));
     scene.cameras = vec![parallel(DVec3::Y, DVec3::ZERO, 1e-4)];
     let (mut expected, down) = (DVec3::ZERO, -Vec3::Y);
-    for i in 0..40 {
+    for i in 0..60 {
         let angle = f64::from(i) * 2.4;
-        let height = 0.2 + 0.05 * f64::from(i);
+        let height = 0.2 + 0.05 * f64::from(i % 40);
         let position = DVec3::new(angle.cos(), height, 2.0 * angle.sin());
         let candela = 1.0 + 0.3 * f64::from(i % 7);
         // E = I cosθ / d²
@@ -118,12 +118,18 @@ fn points_of_light_add_up() {
         // Colours differ: which lights are followed must not change them.
         let mut color = DVec3::splat(0.25);
         color[i as usize % 3] = 1.0;
-        expected += candela * height / distance2.sqrt() / distance2 * color;
+        let irradiance = candela * height / distance2.sqrt() / distance2;
+        let (kind, direction, ramp) = if i % 4 == 0 {
+            spot(position, f64::from(i) * 0.4)
+        } else {
+            (LightKind::Point, down, 1.0)
+        };
+        expected += irradiance * ramp * color;
         scene.lights.push(PunctualLight {
             name: String::from("point"),
-            kind: LightKind::Point,
+            kind,
             position,
-            direction: down,
+            direction,
             intensity: (candela * color).as_vec3(),
         });
     }
@@ -150,6 +156,22 @@ fn points_of_light_add_up() {
             seen.assert_is(estimator.name(), truth[channel], 5e-3);
         }
     }
+}
+
+/// A spot at `position` that is aimed past the origin by `degrees`, and what of its intensity it sends there: from its inner
+/// cone of 10° to beyond its outer one of 20°.
+fn spot(position: DVec3, degrees: f64) -> (LightKind, Vec3, f64) {
+    let towards = -position.normalize();
+    let aside = towards.any_orthonormal_vector();
+    let (sin, cos) = degrees.to_radians().sin_cos();
+    let (inner, outer) = (10.0_f64.to_radians().cos(), 20.0_f64.to_radians().cos());
+    let kind = LightKind::Spot {
+        cos_inner: inner as f32,
+        cos_outer: outer as f32,
+    };
+    // KHR_lights_punctual
+    let ramp = ((cos - outer) / (inner - outer)).clamp(0.0, 1.0).powi(2);
+    (kind, (cos * towards + sin * aside).as_vec3(), ramp)
 }
 
 /// Walls that shine alike all around: a matt square sends on its part of their radiance. Direct light and scattering find them

@@ -3,7 +3,7 @@
 use etendue::render::Tuning;
 use etendue::scene::{LightKind, Medium, Phase, PunctualLight};
 use etendue::settings::{Settings, Strategy};
-use glam::{DVec3, Vec3};
+use glam::{DVec3, Vec3, Vec3Swizzles};
 
 use crate::common::backends::pair;
 use crate::common::*;
@@ -78,7 +78,7 @@ fn single_scattering_of_a_point_light() {
                 return;
             };
             let truth = once_scattered(
-                at,
+                &scene.lights[0],
                 f64::from(half),
                 f64::from(sigma_a + sigma_s),
                 f64::from(sigma_s),
@@ -89,9 +89,77 @@ fn single_scattering_of_a_point_light() {
     }
 }
 
-/// ∫ σ_s e^{−σ s} p(θ) I e^{−σ d}/d² ds along +x through the box, by the midpoint rule in the angle.
-fn once_scattered(light: DVec3, half: f64, sigma_t: f64, sigma_s: f64, phase: Phase) -> f64 {
-    let d = light.y;
+/// A dozen spots about the ray and as many point lights: their cones hold all of the ray, a part of it or none.
+#[test]
+fn single_scattering_of_many_spots() {
+    let (sigma_a, sigma_s, half) = (0.05, 0.2, 2.0);
+    let phase = Phase::HenyeyGreenstein { g: 0.4 };
+    let mut scene = empty();
+    let medium = grey(sigma_a, sigma_s, phase);
+    add(
+        &mut scene,
+        block(Vec3::splat(-half), Vec3::splat(half)),
+        glass(1.0, medium),
+    );
+    scene.cameras = vec![parallel(DVec3::new(-5.0, 0.0, 0.0), DVec3::ZERO, 1e-5)];
+    let sigma_t = f64::from(sigma_a + sigma_s);
+    let once = |light: &PunctualLight| {
+        f64::from(light.intensity.x)
+            * once_scattered(light, f64::from(half), sigma_t, f64::from(sigma_s), phase)
+    };
+    let mut truth = 0.0;
+    for i in 0..24 {
+        let at = f64::from(i);
+        let around = 2.4 * at;
+        let apart = 0.05 + 0.06 * at;
+        let position = DVec3::new(0.15 * at - 1.7, apart * around.cos(), apart * around.sin());
+        let mut light = point_light(position, 1.0 + (i % 5) as f32);
+        if i % 2 == 0 {
+            let (inner, outer) = (0.1 + 0.02 * at, 0.15 + 0.03 * at);
+            light.kind = LightKind::Spot {
+                cos_inner: inner.cos() as f32,
+                cos_outer: outer.cos() as f32,
+            };
+            let target = DVec3::new(1.5 * at.sin(), 0.4 * (1.7 * at).cos(), 0.0);
+            light.direction = (target - position).normalize().as_vec3();
+        }
+        truth += once(&light);
+        scene.lights.push(light);
+    }
+    let settings = Settings {
+        max_depth: 1,
+        ..settings(16, count(8192, 32_768))
+    };
+    let Some(r) = render(&scene, &settings, Tuning::default()) else {
+        return;
+    };
+    assert_channels("spots", &r.film, [truth; 3], 8e-3);
+}
+
+/// What of its intensity a light sends along `to`, unit. KHR_lights_punctual
+fn ramp(light: &PunctualLight, to: DVec3) -> f64 {
+    let LightKind::Spot {
+        cos_inner,
+        cos_outer,
+    } = light.kind
+    else {
+        return 1.0;
+    };
+    let [inner, outer] = [cos_inner, cos_outer].map(f64::from);
+    let cosine = light.direction.as_dvec3().dot(to);
+    ((cosine - outer) / (inner - outer)).clamp(0.0, 1.0).powi(2)
+}
+
+/// ∫ σ_s e^{−σ s} p(θ) e^{−σ d}/d² ds along +x through the box for a light of one candela, by the midpoint rule in the angle.
+fn once_scattered(
+    source: &PunctualLight,
+    half: f64,
+    sigma_t: f64,
+    sigma_s: f64,
+    phase: Phase,
+) -> f64 {
+    let light = source.position;
+    let d = light.yz().length();
     let angle = |x: f64| ((x - light.x) / d).atan();
     let (a, b) = (angle(-half), angle(half));
     let count = 100_000;
@@ -102,7 +170,8 @@ fn once_scattered(light: DVec3, half: f64, sigma_t: f64, sigma_s: f64, phase: Ph
         let distance = d / theta.cos();
         // Light goes from the lamp to the point and then towards −x.
         let to = DVec3::new(x, 0.0, 0.0) - light;
-        let cosine = to.normalize().dot(DVec3::NEG_X);
+        let to = to.normalize();
+        let cosine = to.dot(DVec3::NEG_X);
         let p = match phase {
             Phase::Isotropic => 0.25 / std::f64::consts::PI,
             Phase::Rayleigh => 3.0 / (16.0 * std::f64::consts::PI) * (1.0 + cosine * cosine),
@@ -113,7 +182,7 @@ fn once_scattered(light: DVec3, half: f64, sigma_t: f64, sigma_s: f64, phase: Ph
             }
         };
         // ds = distance²/d dθ cancels 1/distance².
-        sum += (-sigma_t * (x + half) - sigma_t * distance).exp() * p / d;
+        sum += (-sigma_t * (x + half) - sigma_t * distance).exp() * p * ramp(source, to) / d;
     }
     sigma_s * sum * (b - a) / f64::from(count)
 }

@@ -377,6 +377,16 @@ pub const MUTANTS: &[Mutant] = &[
         killers: &["integrator::lamps::lamps_of_many_shapes"],
     },
     Mutant {
+        name: "cluster-beam",
+        wrong: "the tree of lights takes spots for dark between their cones",
+        file: "src/render/light_tree.rs",
+        edits: &[(
+            "cos: f64::from(light.cos_outer),",
+            "cos: f64::from(light.cos_inner),",
+        )],
+        killers: &["integrator::lamps::points_of_light_add_up"],
+    },
+    Mutant {
         name: "candidate-count",
         wrong: "where scattering found the emitter, one of several samples of lights counts for one",
         file: "shaders/path.glsl",

@@ -311,4 +311,21 @@ pub const MUTANTS: &[Mutant] = &[
         )],
         killers: &["shading::media::approaches_to_a_light_have_their_density"],
     },
+    Mutant {
+        name: "segment-beam",
+        wrong: "the tree of lights asks of a segment in a spot's cone for its ends alone",
+        file: "shaders/light_tree.glsl",
+        edits: &[("a > 0.0 ? vec2(clamp(b * c / a, x.x, x.y)) : x;", "x;")],
+        killers: &["matter::fog::single_scattering_of_many_spots"],
+    },
+    Mutant {
+        name: "segment-share",
+        wrong: "of light along a segment and light at its end one is followed, but counts for itself alone",
+        file: "shaders/path.glsl",
+        edits: &[
+            ("path.shadow.value /= 1.0 - share;", ""),
+            ("value /= share;", ""),
+        ],
+        killers: &["matter::fog::single_scattering_of_a_point_light"],
+    },
 ];
