@@ -14,6 +14,8 @@
 const float CLUSTER_SLACK = 1.0e-3;
 // The square of how much closer than its start a segment passes at most by a light, relative …
 const float CLOSE = 1.0e-8;
+// … in square metres, so that a light on it is no division by zero …
+const float CLOSEST = 1.0e-30;
 // … and the longest that is told from longer ones, metres: the squares of more overflow.
 const float SEGMENT_MOST = 1.0e12;
 
@@ -107,7 +109,8 @@ float light_segment_importance(uvec4 sphere, uvec4 cone, LightView view)
     float radius2 = max(square(uintBitsToFloat(sphere.w)), CLOSE * dot(to, to));
     float along = dot(to, view.direction);
     vec3 apart = along * view.direction - to;
-    vec2 x = vec2(-along, min(view.end, SEGMENT_MOST) - along);
+    float span = min(view.end, SEGMENT_MOST);
+    vec2 x = vec2(-along, span - along);
     float apart2 = dot(apart, apart);
     float distance2 = apart2 + square(max(max(x.x, -x.y), 0.0));
     float cosines = 1.0;
@@ -116,10 +119,10 @@ float light_segment_importance(uvec4 sphere, uvec4 cone, LightView view)
         vec2 reach = vec2(sqrt(1.0 - sine2), sqrt(sine2));
         cosines = light_cone_bound(cone, light_segment_cosine(light_axis(cone.x), apart, view.direction, x), reach);
     }
-    // ∫ dx / (c + x²) = 2 atan(t) / √c, where t = span √c / (√((c + x₀²) (c + x₁²)) + c + x₀ x₁); 2 t / (1 + 2 t / π) for 2 atan t
-    float c = max(apart2, radius2);
-    float span = x.y - x.x;
-    float around = sqrt((c + x.x * x.x) * (c + x.y * x.y)) + c + x.x * x.y;
+    // ∫ dx / (c + x²) = 2 atan(t) / √c, where t = span √c / (√(c + x₀²) √(c + x₁²) + c + x₀ x₁); 2 t / (1 + 2 t / π) for 2 atan t
+    float c = max(max(apart2, radius2), CLOSEST);
+    vec2 ends = sqrt(c + x * x);
+    float around = ends.x * ends.y + c + x.x * x.y;
     return abs(uintBitsToFloat(cone.z)) * cosines * span / (around + 2.0 / PI * span * sqrt(c));
 }
 

@@ -11,7 +11,7 @@ use glam::DVec3;
 use super::lights::{Emitter, alias_table};
 use crate::layout;
 
-/// Emitters of a leaf, which shares them out by power, at most …
+/// Triangles of a leaf, which shares them out by power, at most …
 const LEAF: usize = 4;
 /// … if they face much the same way: cosine of the widest cone of their normals.
 const LEAF_CONE: f64 = 0.5;
@@ -194,8 +194,11 @@ pub(crate) fn is_needed(emitters: &[Emitter]) -> bool {
 }
 
 fn is_leaf(places: &[Place], members: &[usize]) -> bool {
+    // spots are told apart by their cones
+    let is_face = |m: &usize| places[*m].cone.is_some_and(|c| !c.is_sharp);
     let is_narrow = |bounds: Bounds| bounds.cone.is_some_and(|c| c.cos >= LEAF_CONE);
-    members.len() == 1 || members.len() <= LEAF && is_narrow(bounds(places, members))
+    let is_alike = || members.iter().all(is_face) && is_narrow(bounds(places, members));
+    members.len() == 1 || members.len() <= LEAF && is_alike()
 }
 
 fn bounds(places: &[Place], members: &[usize]) -> Bounds {

@@ -378,11 +378,11 @@ pub const MUTANTS: &[Mutant] = &[
     },
     Mutant {
         name: "cluster-beam",
-        wrong: "the tree of lights takes spots for dark between their cones",
-        file: "src/render/light_tree.rs",
+        wrong: "the tree of lights takes spots for dark at 10° from their axis",
+        file: "shaders/light_tree.glsl",
         edits: &[(
-            "cos: f64::from(light.cos_outer),",
-            "cos: f64::from(light.cos_inner),",
+            "light_angle_beyond(beyond, reach).x < 1.0;",
+            "cosine < 0.985;",
         )],
         killers: &["integrator::lamps::points_of_light_add_up"],
     },

@@ -73,6 +73,7 @@ pub fn run(args: &BenchArgs) -> Result<Outcome, Failure> {
         contest.run(&peers, &mut out)?;
         out.note(&format!("{}: rates", scene_name(path)));
         let rounds = args.seeds;
+        let backends = rates::offered(path, &device.0, &mut out)?;
         for estimator in [Estimator::Full, Estimator::Textbook] {
             let ways = &args.estimators;
             if !ways.iter().any(|way| way.estimator() == estimator) {
@@ -83,7 +84,7 @@ pub fn run(args: &BenchArgs) -> Result<Outcome, Failure> {
                 ..settings.clone()
             };
             rates::run(
-                path, scene, &settings, &options, rounds, &device.0, &mut out,
+                path, scene, &settings, &options, rounds, &backends, &mut out,
             )?;
         }
         if args.limits {

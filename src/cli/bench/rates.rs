@@ -4,7 +4,7 @@ use std::path::Path;
 
 use etendue::render::{DeviceOptions, Renderer, Tuning, devices};
 use etendue::scene::Scene;
-use etendue::settings::Settings;
+use etendue::settings::{BackendChoice, Settings};
 
 use super::super::failure::Failure;
 use super::contender::{render_all, warm_up};
@@ -14,52 +14,57 @@ use super::{Output, scene_name};
 /// Samples a pixel of a round.
 const SPP: u64 = 16;
 
-/// Renders in rounds by the estimator of the settings, every traversal that the device offers once a round; it is said what
-/// the others lack.
+/// The traversals that the device offers; it is said what the others lack.
+pub fn offered(path: &Path, device: &str, out: &mut Output) -> Result<Vec<BackendChoice>, Failure> {
+    let this = devices()?.into_iter().find(|info| info.name == device);
+    let mut offered = Vec::new();
+    for (backend, support) in this.map(|info| info.backends).unwrap_or_default() {
+        match support {
+            Ok(()) => offered.push(backend),
+            Err(lacks) => {
+                let reason = format!("the device lacks {lacks}");
+                out.line(&skipped(path, backend, reason))?;
+            }
+        }
+    }
+    Ok(offered)
+}
+
+fn skipped(path: &Path, backend: BackendChoice, reason: String) -> Line {
+    Line::Skipped(Skipped {
+        scene: scene_name(path),
+        contender: backend.name().to_owned(),
+        reason,
+    })
+}
+
+/// Renders in rounds by the estimator of the settings, every one of the traversals once a round.
 pub fn run(
     path: &Path,
     scene: &Scene,
     settings: &Settings,
     options: &DeviceOptions,
     rounds: u64,
-    device: &str,
+    backends: &[BackendChoice],
     out: &mut Output,
 ) -> Result<(), Failure> {
-    let estimator = settings.estimator;
-    let name = scene_name(path);
     let mut renderers = Vec::new();
-    let this = devices()?.into_iter().find(|info| info.name == device);
-    let backends = this.map(|info| info.backends).unwrap_or_default();
-    for (backend, support) in backends {
-        let skipped = |reason| {
-            Line::Skipped(Skipped {
-                scene: name.clone(),
-                contender: backend.name().to_owned(),
-                reason,
-            })
-        };
+    for &backend in backends {
         let settings = Settings {
             backend,
             ..settings.clone()
         };
-        let renderer = match support {
-            // the device's own test of triangles is part of what is measured
-            Ok(()) => {
-                let tuning = Tuning {
-                    boxes: Some(false),
-                    ..Tuning::default()
-                };
-                let renderer = Renderer::tuned(scene, &settings, options, tuning);
-                renderer.map_err(|e| e.to_string())
-            }
-            Err(lacks) => Err(format!("the device lacks {lacks}")),
+        // the device's own test of triangles is part of what is measured
+        let tuning = Tuning {
+            boxes: Some(false),
+            ..Tuning::default()
         };
-        match renderer {
+        match Renderer::tuned(scene, &settings, options, tuning) {
             Ok(mut renderer) => {
                 warm_up(&mut renderer)?;
                 renderers.push((backend, renderer));
             }
-            Err(reason) => out.line(&skipped(reason))?,
+            Err(e) => out.line(&skipped(path, backend, e.to_string()))?,
         }
     }
     for round in 1..=rounds {
@@ -68,9 +73,9 @@ pub fn run(
             let report = renderer.report();
             let seconds = report.times.render;
             out.line(&Line::Rate(Rate {
-                scene: name.clone(),
+                scene: scene_name(path),
                 backend: backend.name().to_owned(),
-                estimator: estimator.name().to_owned(),
+                estimator: settings.estimator.name().to_owned(),
                 round,
                 spp: SPP,
                 seconds,
