@@ -63,8 +63,8 @@ fn lamps_of_many_shapes() {
     }
 }
 
-/// Powers beyond single precision: the same picture, but for its unit. In fog squares of distances would be, where rays
-/// leave the scene, and the longest segments count as of one length: their lights are others, as many.
+/// Powers beyond single precision: the same picture, but for its unit. In fog the longest segments count as of one length in
+/// metres, so that a few of them choose other lights.
 #[test]
 fn lamps_of_any_size_and_brightness() {
     // Powers of two, so that nothing is rounded anew.

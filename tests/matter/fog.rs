@@ -1,7 +1,7 @@
 //! Light through fog: what arrives unscattered, once scattered, and after many times.
 
 use etendue::render::Tuning;
-use etendue::scene::{LightKind, Medium, Phase, PunctualLight};
+use etendue::scene::{LightKind, Medium, Phase, PunctualLight, Scene};
 use etendue::settings::{Settings, Strategy};
 use glam::{DVec3, Vec3, Vec3Swizzles};
 
@@ -48,6 +48,18 @@ fn point_light_in_absorbing_fog() {
     }
 }
 
+/// A box without an index about the origin, seen along +x.
+fn box_of_fog(half: f32, medium: Medium) -> Scene {
+    let mut scene = empty();
+    add(
+        &mut scene,
+        block(Vec3::splat(-half), Vec3::splat(half)),
+        glass(1.0, medium),
+    );
+    scene.cameras = vec![parallel(DVec3::new(-5.0, 0.0, 0.0), DVec3::ZERO, 1e-5)];
+    scene
+}
+
 /// Light along a ray that is scattered once: a point light beside the ray in thin fog, by quadrature.
 #[test]
 fn single_scattering_of_a_point_light() {
@@ -60,16 +72,8 @@ fn single_scattering_of_a_point_light() {
         for height in [1.0, 0.01] {
             let (sigma_a, sigma_s) = (0.05, 0.2);
             let (half, at) = (2.0, DVec3::new(0.3, height, 0.0));
-            let mut scene = empty();
-            let medium = grey(sigma_a, sigma_s, phase);
-            add(
-                &mut scene,
-                block(Vec3::splat(-half), Vec3::splat(half)),
-                glass(1.0, medium),
-            );
+            let mut scene = box_of_fog(half, grey(sigma_a, sigma_s, phase));
             scene.lights = vec![point_light(at, 1.0)];
-            let from = DVec3::new(-5.0, 0.0, 0.0);
-            scene.cameras = vec![parallel(from, DVec3::ZERO, 1e-5)];
             let settings = Settings {
                 max_depth: 1,
                 ..settings(16, count(4096, 16_384))
@@ -94,14 +98,7 @@ fn single_scattering_of_a_point_light() {
 fn single_scattering_of_many_spots() {
     let (sigma_a, sigma_s, half) = (0.05, 0.2, 2.0);
     let phase = Phase::HenyeyGreenstein { g: 0.4 };
-    let mut scene = empty();
-    let medium = grey(sigma_a, sigma_s, phase);
-    add(
-        &mut scene,
-        block(Vec3::splat(-half), Vec3::splat(half)),
-        glass(1.0, medium),
-    );
-    scene.cameras = vec![parallel(DVec3::new(-5.0, 0.0, 0.0), DVec3::ZERO, 1e-5)];
+    let mut scene = box_of_fog(half, grey(sigma_a, sigma_s, phase));
     let sigma_t = f64::from(sigma_a + sigma_s);
     let once = |light: &PunctualLight| {
         f64::from(light.intensity.x)
