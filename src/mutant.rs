@@ -3,11 +3,15 @@
 //! uses; the errors are listed in tests/mutants.
 
 /// SPIR-V that stands in for the kernel of this name: a file of the folder that
-/// `ETENDUE_MUTANT_SPIRV` names, if it is there.
+/// `ETENDUE_MUTANT_SPIRV` names, if it is there. If not, the folder gets an empty file `NAME.asked`.
 #[cfg(feature = "mutants")]
 pub(crate) fn spirv(kernel: &str) -> Option<Vec<u8>> {
-    let folder = std::env::var_os("ETENDUE_MUTANT_SPIRV")?;
-    std::fs::read(std::path::Path::new(&folder).join(format!("{kernel}.spv"))).ok()
+    let file = std::path::PathBuf::from(std::env::var_os("ETENDUE_MUTANT_SPIRV")?).join(kernel);
+    let planted = std::fs::read(file.with_extension("spv")).ok();
+    if planted.is_none() {
+        std::fs::write(file.with_extension("asked"), "").ok();
+    }
+    planted
 }
 
 /// Whether `ETENDUE_MUTANT` names this error of the host's code.

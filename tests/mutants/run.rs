@@ -3,7 +3,7 @@
 //! Environment: `ETENDUE_MUTANTS`, names with commas, runs those only and leaves the
 //! other rows of the page as they are; `ETENDUE_MUTANTS_ALL=1` goes on after the first test that finds one.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
@@ -34,29 +34,40 @@ fn is_part(file: &str, of: &str) -> bool {
     }
 }
 
-/// Compiles every shader that the changed file is a part of into `folder`.
-fn compile_planted(mutant: &Mutant, folder: &Path) {
-    let Some(file) = mutant.file.strip_prefix("shaders/") else {
-        return;
-    };
-    let changed = planted(mutant).unwrap();
+/// Whether the mutant changes the kernel of an entry of the table.
+fn is_changed(mutant: &Mutant, source: &str) -> bool {
+    let file = mutant.file.strip_prefix("shaders/");
+    file.is_some_and(|file| is_part(file, source))
+}
+
+/// Compiles those of the kernels that the mutant changes into `folder`, where they are not there yet.
+fn plant(mutant: &Mutant, kernels: &BTreeSet<String>, folder: &Path) {
     let read = |name: &str| {
-        if name == file {
-            return Ok(changed.clone());
+        if mutant.file.strip_prefix("shaders/") == Some(name) {
+            return planted(mutant);
         }
         std::fs::read_to_string(root().join("shaders").join(name)).map_err(|e| e.to_string())
     };
-    // `shading` runs kernels of its own, all other tests run the renderer's.
-    let is_of =
-        |test: &str, source: &str| source.starts_with("tests/") == test.starts_with("shading::");
-    let is_used = |source: &str| mutant.killers.iter().any(|test| is_of(test, source));
+    let is_missing = |name: &str| !folder.join(name).with_extension("spv").exists();
     let entries: Vec<Entry> = SHADERS
         .iter()
-        .filter(|(source, ..)| is_part(file, source) && is_used(source))
+        .filter(|(source, _, name)| {
+            kernels.contains(*name) && is_changed(mutant, source) && is_missing(name)
+        })
         .copied()
         .collect();
     let level = shaderc::OptimizationLevel::Performance;
     compile_all(&entries, level, &read, folder);
+}
+
+/// Kernels that a test asked for and that were not planted in `folder`.
+fn asked(folder: &Path) -> BTreeSet<String> {
+    let entries = folder.read_dir().unwrap();
+    entries
+        .map(|entry| entry.unwrap().path())
+        .filter(|path| path.extension().is_some_and(|e| e == "asked"))
+        .map(|path| path.file_stem().unwrap().to_string_lossy().into_owned())
+        .collect()
 }
 
 /// A row of the matrix.
@@ -131,18 +142,25 @@ fn every_mutant_is_found_and_no_control() {
             .is_none_or(|names| names.split(',').any(|n| n == m.name))
     };
     let binaries = binaries(&["mutants"], &[]);
-    let nothing = tempfile::tempdir().unwrap();
-    let mut healthy = BTreeMap::new();
+    // Tests that pass without a mutant, and the kernels that they run.
+    let mut healthy: BTreeMap<_, BTreeSet<String>> = BTreeMap::new();
     let mut rows = Vec::new();
     for mutant in mutants().filter(is_chosen) {
         let folder = tempfile::tempdir().unwrap();
-        compile_planted(mutant, folder.path());
         let mut row = Row {
             mutant,
             found_by: Vec::new(),
             missed_by: Vec::new(),
         };
         for test in mutant.killers {
+            let kernels = healthy.entry(*test).or_insert_with(|| {
+                let nothing = tempfile::tempdir().unwrap();
+                let outcome = run(&binaries, test, "none", nothing.path());
+                // A test that fails anyway finds nothing.
+                assert_eq!(outcome, Outcome::Passed, "{test} without a mutant");
+                asked(nothing.path())
+            });
+            plant(mutant, kernels, folder.path());
             let started = Instant::now();
             let outcome = run(&binaries, test, mutant.name, folder.path());
             println!(
@@ -150,15 +168,16 @@ fn every_mutant_is_found_and_no_control() {
                 mutant.name,
                 started.elapsed().as_secs_f64()
             );
+            let is_healthy = |name: &String| {
+                let mut shaders = SHADERS.iter();
+                !shaders.any(|(source, _, n)| n == name && is_changed(mutant, source))
+            };
+            let others = asked(folder.path());
+            assert!(others.iter().all(is_healthy), "{test} ran {others:?}, too");
             if outcome == Outcome::Passed {
                 row.missed_by.push(format!("`{test}`"));
                 continue;
             }
-            // A test that fails anyway finds nothing.
-            let is_healthy = healthy
-                .entry(*test)
-                .or_insert_with(|| run(&binaries, test, "none", nothing.path()));
-            assert_eq!(*is_healthy, Outcome::Passed, "{test} without a mutant");
             row.found_by.push(format!("`{test}`"));
             if !is_whole {
                 break;

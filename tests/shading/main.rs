@@ -69,16 +69,18 @@ fn open() -> Option<Arc<Device>> {
     }
 }
 
-/// SPIR-V of a kernel; with the feature `mutants`, of the changed one that tests/mutants made of it.
+/// SPIR-V of a kernel; with the feature `mutants`, of the changed one that tests/mutants made of it, which is told the names.
 fn spirv(name: &str) -> Vec<u8> {
-    let file = format!("{name}.spv");
     if cfg!(feature = "mutants") {
         let folder = std::env::var_os("ETENDUE_MUTANT_SPIRV").unwrap_or_default();
-        if let Ok(planted) = std::fs::read(PathBuf::from(folder).join(&file)) {
+        let file = PathBuf::from(folder).join(name);
+        if let Ok(planted) = std::fs::read(file.with_extension("spv")) {
             return planted;
         }
+        std::fs::write(file.with_extension("asked"), "").ok();
     }
-    std::fs::read(PathBuf::from(env!("ETENDUE_SHADER_DIR")).join(&file)).unwrap()
+    let file = format!("{name}.spv");
+    std::fs::read(PathBuf::from(env!("ETENDUE_SHADER_DIR")).join(file)).unwrap()
 }
 
 /// Destroys the device and asserts that validation had nothing to say.
