@@ -121,7 +121,7 @@ vec3 direct_normal(SurfacePoint s, Bsdf bsdf)
 // How far the numbers of one sample of a light are from those of the next, multiples of 2⁻²³: powers of the golden and the plastic ratio.
 const vec3 CANDIDATE_TURNS = vec3(5184444.0, 6332377.0, 4780167.0) / 8388608.0;
 
-// Samples of lights of which one is followed. What the tree does not know, the BSDF's lobes, matters most where the camera sees it.
+// Samples of lights of which one is followed, one or an even number. What the tree does not know, the BSDF's lobes, matters most where the camera sees it.
 int direct_candidates(bool is_first)
 {
     if (!HAS_LIGHT_TREE) {
@@ -131,9 +131,9 @@ int direct_candidates(bool is_first)
 }
 
 // Direct light by one of `count` samples of lights, which a surface scatters along wo, in the frame, for throughput one.
-DirectLight direct_sample(SurfacePoint s, Bsdf bsdf, mat3 frame, vec3 wo, LightView view, vec4 u, int count)
+DirectLight direct_sample(SurfacePoint s, Bsdf bsdf, mat3 frame, vec3 wo, LightChoice choice, vec4 u, int count)
 {
-    DirectLight direct = DirectLight(light_sample(s.position, view, u), vec3(0.0), s.position);
+    DirectLight direct = DirectLight(light_from(choice, s.position, u), vec3(0.0), s.position);
     LightSample light = direct.light;
     float side = dot(light.wi, s.ng);
     if (light.pdf > 0.0 && (side > 0.0 || (bsdf_transmits_widely(bsdf) && side < 0.0))) {
@@ -152,7 +152,7 @@ DirectLight direct_on_surface(SurfacePoint s, Bsdf bsdf, mat3 frame, vec3 wo, uv
     vec4 u = rng_uniform(key, event, SLOT_LIGHT);
     int count = direct_candidates(is_first);
     if (count == 1) {
-        return direct_sample(s, bsdf, frame, wo, view, u, count);
+        return direct_sample(s, bsdf, frame, wo, light_choose(view, u), u, count);
     }
     vec4 turn = vec4(1.0 / float(count), CANDIDATE_TURNS);
     float coin = rng_coin(key, event, SLOT_CANDIDATE);
@@ -160,9 +160,16 @@ DirectLight direct_on_surface(SurfacePoint s, Bsdf bsdf, mat3 frame, vec3 wo, uv
     DirectLight direct;
     direct.light.wi = s.ng;
     direct.value = vec3(0.0);
+    LightChoice next;
     for (int k = 0; k < count; k++) {
-        DirectLight candidate = direct_sample(s, bsdf, frame, wo, view, u, count);
-        u = sample_turned(u, turn);
+        vec4 u_next = sample_turned(u, turn);
+        LightChoice choice = next;
+        // every other step chooses for two
+        if (k % 2 == 0) {
+            light_choose_two(view, u, u_next, choice, next);
+        }
+        DirectLight candidate = direct_sample(s, bsdf, frame, wo, choice, u, count);
+        u = u_next;
         float weight = candidate.value.x + candidate.value.y + candidate.value.z;
         if (weight != 0.0) {
             sum += weight;

@@ -240,7 +240,9 @@ struct Light {
 };
 const uint LIGHT_TEXELS = 6u;
 // With HAS_LIGHT_TREE the lights of the tree follow those of the table, leaf by leaf with an alias table each, then nodes of four
-// texels, two for each child: (centre, radius), (packed axis, cosine of the cone, power, link). A link
+// texels, two for each child: (centre, radius | sine), (axis x | y << 16, axis z | cosine << 16, intensity, link). Sine and cosine are
+// those of half the cone's angle, 16 bits as packUnorm2x16 and packSnorm2x16 have them; the radius has upper bits alone, and is what
+// the whole word says at most; the intensity is negative where nothing goes beyond the cone. A link
 // is a node or LIGHT_LEAF | lights of the leaf − 1 (three bits) | its first light. Keys of one texel, sorted: placement, triangle,
 // the way to the leaf (a bit for each step, the first one lowest), power of the leaf.
 const uint LIGHT_NODE_TEXELS = 4u;

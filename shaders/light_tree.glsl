@@ -2,7 +2,6 @@
 // the tree (src/render/light_tree.rs) one of two clusters, in proportion to a bound.
 //
 // [Conty18] Conty Estevez, Kulla, Importance Sampling of Many Lights with Adaptive Tree Splitting.
-// [Cigolle14] Cigolle et al., A Survey of Efficient Representations for Independent Unit Vectors.
 
 #ifndef LIGHT_TREE_GLSL
 #define LIGHT_TREE_GLSL
@@ -19,6 +18,9 @@ const float CLOSEST = 1.0e-30;
 // … and the longest that is told from longer ones, metres: the squares of more overflow.
 const float SEGMENT_MOST = 1.0e12;
 
+// One over what stands for one in words of clusters: 2¹⁶ (2¹⁵ − 1).
+const float CLUSTER_UNIT = 1.0 / 2147418112.0;
+
 // Where light is asked for: a point of a surface, or a segment in a medium, whose light may be scattered anywhere on it.
 struct LightView {
     vec3 origin;
@@ -31,13 +33,38 @@ LightView light_view_surface(vec3 point, vec3 normal)
     return LightView(point, normal, -1.0);
 }
 
-vec3 light_axis(uint packed)
+// What a node knows of a child.
+struct LightCluster {
+    vec3 centre;     // of a sphere about the emitters
+    float radius;
+    vec3 axis;       // of the cone of their normals, or of all that spots shine to
+    vec2 angle;      // cosine and sine of its half angle; cosine −1: all directions
+    float intensity;
+    bool is_sharp;   // nothing goes beyond the cone
+    uint link;
+};
+
+// A cluster in two texels. Words of two numbers are taken for the upper one: what the lower one adds is less than its last bit.
+LightCluster light_cluster(uvec4 sphere, uvec4 cone)
 {
-    vec2 e = unpackSnorm2x16(packed);
-    vec3 v = vec3(e, 1.0 - abs(e.x) - abs(e.y));
-    float fold = max(-v.z, 0.0);
-    v.xy += vec2(v.x >= 0.0 ? -fold : fold, v.y >= 0.0 ? -fold : fold);
-    return normalize(v);
+    ivec2 upper = ivec2(cone.xy);
+    ivec2 lower = upper << 16;
+    LightCluster c;
+    c.centre = uintBitsToFloat(sphere.xyz);
+    c.radius = uintBitsToFloat(sphere.w);
+    c.axis = vec3(lower.x, upper.x, lower.y) * CLUSTER_UNIT;
+    c.angle = vec2(float(upper.y) * CLUSTER_UNIT, float(sphere.w & 0xFFFFu) / 65535.0);
+    c.intensity = abs(uintBitsToFloat(cone.z));
+    c.is_sharp = HAS_PUNCTUAL && uintBitsToFloat(cone.z) < 0.0;
+    c.link = cone.w;
+    return c;
+}
+
+// Comparisons instead of max, which takes three instructions on lavapipe for the sake of NaN.
+float light_not_negative(float x)
+{
+    precise float y = x > 0.0 ? x : 0.0;
+    return y;
 }
 
 // Cosine and sine of max(a − b, 0) for angles in [0, π].
@@ -49,20 +76,28 @@ vec2 light_angle_beyond(vec2 a, vec2 b)
 // Cosine and sine of an angle in [0, π].
 vec2 light_angle(float cosine)
 {
-    return vec2(cosine, sqrt(max(1.0 - cosine * cosine, 0.0)));
+    return vec2(cosine, sqrt(light_not_negative(1.0 - cosine * cosine)));
 }
 
 // The largest cosine that an angle can have that is smaller by `reach` at most.
 float light_cosine_bound(vec2 angle, vec2 reach)
 {
-    return max(light_angle_beyond(angle, reach).x + CLUSTER_SLACK, 0.0);
+    return light_not_negative(light_angle_beyond(angle, reach).x + CLUSTER_SLACK);
+}
+
+// About as much, without a root, for an angle of that cosine and another of that sine; 0 for the same ones.
+float light_horizon_bound(float cosine, float sine)
+{
+    precise float bound = light_not_negative(cosine + sine + CLUSTER_SLACK);
+    bound = bound < 1.0 ? bound : 1.0;
+    return bound;
 }
 
 // The most that a cluster sends to where `cosine` is that of the angle with its axis, as part of its intensity.
-float light_cone_bound(uvec4 cone, float cosine, vec2 reach)
+float light_cone_bound(LightCluster c, float cosine, vec2 reach)
 {
-    vec2 beyond = light_angle_beyond(light_angle(cosine), light_angle(uintBitsToFloat(cone.y)));
-    bool is_dark = uintBitsToFloat(cone.z) < 0.0 && light_angle_beyond(beyond, reach).x < 1.0;
+    vec2 beyond = light_angle_beyond(light_angle(cosine), c.angle);
+    bool is_dark = c.is_sharp && light_angle_beyond(beyond, reach).x < 1.0;
     return is_dark ? 0.0 : light_cosine_bound(beyond, reach);
 }
 
@@ -79,34 +114,33 @@ float light_segment_cosine(vec3 axis, vec3 apart, vec3 direction, vec2 x)
     return max(cosines.x, cosines.y);
 }
 
-// In proportion to the most that the cluster in two texels can give at a point of a surface.
-float light_surface_importance(uvec4 sphere, uvec4 cone, LightView view)
+// In proportion to the most that a cluster can give at a point of a surface. Roots and quotients take most of the time.
+float light_surface_importance(LightCluster c, LightView view)
 {
-    vec3 to = uintBitsToFloat(sphere.xyz) - view.origin;
-    float radius2 = square(uintBitsToFloat(sphere.w));
+    vec3 to = c.centre - view.origin;
     float distance2 = dot(to, to);
-    float cosines = 1.0;
-    if (distance2 > radius2) {
-        to *= inversesqrt(distance2);
-        float sine2 = radius2 / distance2;
-        vec2 reach = vec2(sqrt(1.0 - sine2), sqrt(sine2));
-        if (uintBitsToFloat(cone.y) > -1.0) {
-            cosines = light_cone_bound(cone, -dot(light_axis(cone.x), to), reach);
-        }
-        if (!HAS_DIELECTRIC || view.direction != vec3(0.0)) {
-            cosines *= light_cosine_bound(light_angle(dot(view.direction, to)), reach);
-        }
+    float radius2 = square(c.radius);
+    precise float nearest2 = distance2 > radius2 ? distance2 : radius2;
+    float inverse = inversesqrt(nearest2);
+    // of the angle at which the sphere is seen
+    float sine = c.radius * inverse;
+    vec2 reach = vec2(sqrt(light_not_negative(1.0 - sine * sine)), sine);
+    to *= inverse;
+    float cosines = light_cone_bound(c, -dot(c.axis, to), reach);
+    if (!HAS_DIELECTRIC || view.direction != vec3(0.0)) {
+        cosines *= light_horizon_bound(dot(view.direction, to), sine);
     }
-    return abs(uintBitsToFloat(cone.z)) * cosines / max(distance2, radius2);
+    cosines = distance2 > radius2 ? cosines : 1.0;
+    return c.intensity * cosines * square(inverse);
 }
 
 // The same for a segment as a whole, over which 1/distance² is summed: by its smallest distance alone, what passes
 // close by one light would hardly ever see the others.
-float light_segment_importance(uvec4 sphere, uvec4 cone, LightView view)
+float light_segment_importance(LightCluster cluster, LightView view)
 {
-    vec3 to = uintBitsToFloat(sphere.xyz) - view.origin;
+    vec3 to = cluster.centre - view.origin;
     // lines that pass closer are not told apart
-    float radius2 = max(square(uintBitsToFloat(sphere.w)), CLOSE * dot(to, to));
+    float radius2 = max(square(cluster.radius), CLOSE * dot(to, to));
     float along = dot(to, view.direction);
     vec3 apart = along * view.direction - to;
     float span = min(view.end, SEGMENT_MOST);
@@ -114,56 +148,66 @@ float light_segment_importance(uvec4 sphere, uvec4 cone, LightView view)
     float apart2 = dot(apart, apart);
     float distance2 = apart2 + square(max(max(x.x, -x.y), 0.0));
     float cosines = 1.0;
-    if (distance2 > radius2 && uintBitsToFloat(cone.y) > -1.0) {
+    if (distance2 > radius2) {
         float sine2 = radius2 / distance2;
         vec2 reach = vec2(sqrt(1.0 - sine2), sqrt(sine2));
-        cosines = light_cone_bound(cone, light_segment_cosine(light_axis(cone.x), apart, view.direction, x), reach);
+        cosines = light_cone_bound(cluster, light_segment_cosine(cluster.axis, apart, view.direction, x), reach);
     }
     // ∫ dx / (c + x²) = 2 atan(t) / √c, where t = span √c / (√(c + x₀²) √(c + x₁²) + c + x₀ x₁); 2 t / (1 + 2 t / π) for 2 atan t
     float c = max(max(apart2, radius2), CLOSEST);
     vec2 ends = sqrt(c + x * x);
     float around = ends.x * ends.y + c + x.x * x.y;
-    return abs(uintBitsToFloat(cone.z)) * cosines * span / (around + 2.0 / PI * span * sqrt(c));
+    return cluster.intensity * cosines * span / (around + 2.0 / PI * span * sqrt(c));
 }
 
-float light_importance(uvec4 sphere, uvec4 cone, LightView view)
+float light_importance(LightCluster c, LightView view)
 {
     bool is_segment = HAS_SCATTERING && view.end >= 0.0;
-    return is_segment ? light_segment_importance(sphere, cone, view) : light_surface_importance(sphere, cone, view);
+    return is_segment ? light_segment_importance(c, view) : light_surface_importance(c, view);
 }
 
 // Importance of both children of a node, and their links.
 vec2 light_children(uint node, LightView view, out uvec2 links)
 {
     int at = int(params.light_nodes + LIGHT_NODE_TEXELS * node);
-    uvec4 left = texelFetch(lights, at + 1);
-    uvec4 right = texelFetch(lights, at + 3);
-    links = uvec2(left.w, right.w);
-    return vec2(light_importance(texelFetch(lights, at), left, view), light_importance(texelFetch(lights, at + 2), right, view));
+    LightCluster left = light_cluster(texelFetch(lights, at), texelFetch(lights, at + 1));
+    LightCluster right = light_cluster(texelFetch(lights, at + 2), texelFetch(lights, at + 3));
+    links = uvec2(left.link, right.link);
+    return vec2(light_importance(left, view), light_importance(right, view));
 }
 
-// Goes to a leaf by u, which is uniform in the leaf afterwards. Gives the link of the leaf and the
-// probability of the way there; 0: no light can be seen.
-uint light_descend(LightView view, inout float u, out float probability)
+// A way from the root to a leaf.
+struct LightWay {
+    uint link;         // of what it has come to
+    float u;           // uniform, for the rest of the way and in the leaf
+    float probability; // of the way so far; 0: no light can be seen
+};
+
+bool light_arrived(LightWay way)
 {
-    probability = 1.0;
-    uint link = 0u;
-    do {
-        uvec2 links;
-        vec2 importance = light_children(link, view, links);
-        float sum = importance.x + importance.y;
-        if (!(sum > 0.0)) {
-            probability = 0.0;
-            return LIGHT_LEAF;
-        }
-        vec2 share = importance / sum;
-        bool is_right = u >= share.x;
-        probability *= is_right ? share.y : share.x;
-        u = is_right ? (u - share.x) / share.y : u / share.x;
-        u = clamp(u, 0.0, 1.0 - EPSILON);
-        link = is_right ? links.y : links.x;
-    } while ((link & LIGHT_LEAF) == 0u);
-    return link;
+    return (way.link & LIGHT_LEAF) != 0u;
+}
+
+// Goes on to one of two children; nowhere from a leaf.
+void light_step(LightView view, inout LightWay way)
+{
+    bool is_done = light_arrived(way);
+    uvec2 links;
+    vec2 importance = light_children(is_done ? 0u : way.link, view, links);
+    float sum = importance.x + importance.y;
+    float u = way.u * sum;
+    bool is_right = u >= importance.x;
+    float taken = is_right ? importance.y : importance.x;
+    LightWay next;
+    next.link = is_right ? links.y : links.x;
+    next.u = clamp((is_right ? u - importance.x : u) / taken, 0.0, 1.0 - EPSILON);
+    next.probability = way.probability * taken / sum;
+    if (!(sum > 0.0)) {
+        next = LightWay(LIGHT_LEAF, 0.0, 0.0);
+    }
+    if (!is_done) {
+        way = next;
+    }
 }
 
 // Probability of the way to a leaf, a bit for each step.

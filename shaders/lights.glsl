@@ -117,48 +117,88 @@ struct LightChoice {
     Light light;
 };
 
-LightChoice light_choose(LightView view, vec4 u)
+// What light is taken from: the environment, the tree, or else the table.
+struct LightList {
+    bool is_environment;
+    bool is_tree;
+    float u;           // uniform
+};
+
+LightList light_list(float u)
+{
+    LightList list = LightList(false, false, u);
+    if (HAS_ENVIRONMENT) {
+        list.is_environment = u < params.env_choice;
+        if (list.is_environment) {
+            list.u = u / params.env_choice;
+            return list;
+        }
+        list.u -= params.env_choice;
+    }
+    if (HAS_LIGHT_TREE) {
+        list.is_tree = list.u < params.tree_choice;
+        list.u = list.is_tree ? list.u / params.tree_choice : (list.u - params.tree_choice) / params.table_choice;
+    } else if (HAS_ENVIRONMENT) {
+        list.u /= params.table_choice;
+    }
+    return list;
+}
+
+// A way to walk where lights are taken from the tree, else one that has arrived.
+LightWay light_start(LightList list)
+{
+    return LightWay(list.is_tree ? 0u : LIGHT_LEAF, list.u, 1.0);
+}
+
+// The light, from the list or where the way through the tree has arrived.
+LightChoice light_pick(LightList list, LightWay way, float u)
 {
     LightChoice c;
     c.probability = 0.0;
-    c.is_environment = false;
-    float choice = u.x;
-    if (HAS_ENVIRONMENT) {
-        if (choice < params.env_choice) {
-            c.is_environment = true;
-            c.u = choice / params.env_choice;
-            return c;
-        }
-        choice -= params.env_choice;
-    }
-    float probability = params.table_choice;
-    uint count = params.light_count;
-    uint index = 0u;
-    if (HAS_LIGHT_TREE) {
-        if (choice < params.tree_choice) {
-            choice /= params.tree_choice;
-            uint leaf = light_descend(view, choice, probability);
-            if (probability == 0.0) {
-                return c;
-            }
-            probability *= params.tree_choice;
-            index = leaf & LIGHT_LEAF_FIRST_MASK;
-            count = (leaf >> LIGHT_LEAF_COUNT_SHIFT & 7u) + 1u;
-        } else {
-            choice = (choice - params.tree_choice) / params.table_choice;
-        }
-    } else if (HAS_ENVIRONMENT) {
-        choice /= params.table_choice;
-    }
-    if (!HAS_AREA_LIGHTS && !HAS_PUNCTUAL) {
+    c.is_environment = list.is_environment;
+    c.u = list.u;
+    if (list.is_environment || (!HAS_AREA_LIGHTS && !HAS_PUNCTUAL) || (HAS_LIGHT_TREE && way.probability == 0.0)) {
         return c;
     }
+    uint index = 0u;
+    uint count = params.light_count;
+    float probability = params.table_choice;
+    if (HAS_LIGHT_TREE && list.is_tree) {
+        index = way.link & LIGHT_LEAF_FIRST_MASK;
+        count = (way.link >> LIGHT_LEAF_COUNT_SHIFT & 7u) + 1u;
+        probability = way.probability * params.tree_choice;
+    }
     // An empty list reads zeros, which are a light without density.
-    index += min(uint(choice * float(count)), max(count, 1u) - 1u);
+    index += min(uint(way.u * float(count)), max(count, 1u) - 1u);
     uvec4 entry = texelFetch(lights, int(LIGHT_TEXELS * index));
-    c.light = scene_light(u.w < uintBitsToFloat(entry.z) ? index : entry.y);
+    c.light = scene_light(u < uintBitsToFloat(entry.z) ? index : entry.y);
     c.probability = probability;
     return c;
+}
+
+LightChoice light_choose(LightView view, vec4 u)
+{
+    LightList list = light_list(u.x);
+    LightWay way = light_start(list);
+    while (HAS_LIGHT_TREE && !light_arrived(way)) {
+        light_step(view, way);
+    }
+    return light_pick(list, way, u.w);
+}
+
+// Two choices, whose ways are walked side by side: a processor has time for a second one while it waits for the first.
+void light_choose_two(LightView view, vec4 u_a, vec4 u_b, out LightChoice a, out LightChoice b)
+{
+    LightList list_a = light_list(u_a.x);
+    LightList list_b = light_list(u_b.x);
+    LightWay way_a = light_start(list_a);
+    LightWay way_b = light_start(list_b);
+    while (!(light_arrived(way_a) && light_arrived(way_b))) {
+        light_step(view, way_a);
+        light_step(view, way_b);
+    }
+    a = light_pick(list_a, way_a, u_a.w);
+    b = light_pick(list_b, way_b, u_b.w);
 }
 
 // The chosen light for the point `from`. pdf 0 stands for "none this time". The same u stands

@@ -370,27 +370,25 @@ fn texels(places: &[Place], members: &[usize], bounds: &Bounds, link: u32) -> [[
         Some(cone) => (cone.axis, (cone.cos - AXIS_ROUNDING).max(-1.0)),
     };
     let [x, y, z] = centre.to_array().map(f32::to_bits);
+    let sine = (1.0 - cos * cos).sqrt();
     [
-        [x, y, z, radius.to_bits()],
+        [x, y, z, up(radius) | (sine * 65535.0).round() as u32],
         [
-            octahedral(axis),
-            (cos as f32).to_bits(),
+            snorms(axis.x, axis.y),
+            snorms(axis.z, cos),
             (bounds.intensity() as f32).to_bits(),
             link,
         ],
     ]
 }
 
-/// A unit vector in two times 16 bits, as `packSnorm2x16` would: the octahedron |x| + |y| + |z| = 1
-/// unfolded into a square. [Cigolle14]
-fn octahedral(v: DVec3) -> u32 {
-    let v = v / (v.x.abs() + v.y.abs() + v.z.abs());
-    let sign = |x: f64| if x < 0.0 { -1.0 } else { 1.0 };
-    let (x, y) = if v.z >= 0.0 {
-        (v.x, v.y)
-    } else {
-        ((1.0 - v.y.abs()) * sign(v.x), (1.0 - v.x.abs()) * sign(v.y))
-    };
+/// Two numbers in 16 bits each, as `packSnorm2x16` would.
+fn snorms(low: f64, high: f64) -> u32 {
     let pack = |x: f64| u32::from((x * 32767.0).round() as i16 as u16);
-    pack(x) | pack(y) << 16
+    pack(low) | pack(high) << 16
+}
+
+/// Bits of a float that is not negative, rounded up to one whose lower 16 bits are 0.
+fn up(x: f32) -> u32 {
+    x.to_bits().saturating_add(0xFFFF) & 0xFFFF_0000
 }

@@ -351,7 +351,7 @@ pub const MUTANTS: &[Mutant] = &[
         wrong: "the density leaves out the way through the tree of lights",
         file: "shaders/lights.glsl",
         edits: &[(
-            "probability *= params.tree_choice;",
+            "probability = way.probability * params.tree_choice;",
             "probability = params.tree_choice;",
         )],
         killers: &["integrator::lamps::points_of_light_add_up"],
