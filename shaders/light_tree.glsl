@@ -195,13 +195,13 @@ void light_step(LightView view, inout LightWay way)
     uvec2 links;
     vec2 importance = light_children(is_done ? 0u : way.link, view, links);
     float sum = importance.x + importance.y;
-    float u = way.u * sum;
-    bool is_right = u >= importance.x;
-    float taken = is_right ? importance.y : importance.x;
+    vec2 share = importance / sum;
+    bool is_right = way.u >= share.x;
+    float taken = is_right ? share.y : share.x;
     LightWay next;
     next.link = is_right ? links.y : links.x;
-    next.u = clamp((is_right ? u - importance.x : u) / taken, 0.0, 1.0 - EPSILON);
-    next.probability = way.probability * taken / sum;
+    next.u = clamp((is_right ? way.u - share.x : way.u) / taken, 0.0, 1.0 - EPSILON);
+    next.probability = way.probability * taken;
     if (!(sum > 0.0)) {
         next = LightWay(LIGHT_LEAF, 0.0, 0.0);
     }

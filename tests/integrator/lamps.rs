@@ -168,6 +168,31 @@ fn points_of_light_add_up() {
     }
 }
 
+/// The same where clusters are on both sides of the floor, most of each below: the tree splits them across their longer axis.
+#[test]
+fn points_below_the_floor_hide_none_above() {
+    let mut scene = empty();
+    add(&mut scene, square(Vec3::ZERO, Vec3::Y, 3.0), lambert(1.0));
+    scene.cameras = vec![parallel(DVec3::Y, DVec3::ZERO, 1e-4)];
+    let mut expected = 0.0;
+    for (x, height) in [(-1.0, 0.3), (-1.0, -0.9), (1.0, 0.4), (1.0, -0.8)] {
+        let position = DVec3::new(x, height, 0.0);
+        expected += height.max(0.0) / position.length().powi(3);
+        scene.lights.push(PunctualLight {
+            name: String::from("point"),
+            kind: LightKind::Point,
+            position,
+            direction: -Vec3::Y,
+            intensity: Vec3::ONE,
+        });
+    }
+    let Some(r) = render(&scene, &settings(8, 1024), Tuning::default()) else {
+        return;
+    };
+    let seen = Estimate::of_film(&r.film, &[0, 1, 2]);
+    seen.assert_is("points", expected / std::f64::consts::PI, 5e-3);
+}
+
 /// A spot at `position` that is aimed past the origin by `degrees`, and what of its intensity it sends there: from its inner
 /// cone of 10° to beyond its outer one of 20°.
 fn spot(position: DVec3, degrees: f64) -> (LightKind, Vec3, f64) {

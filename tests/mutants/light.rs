@@ -377,6 +377,16 @@ pub const MUTANTS: &[Mutant] = &[
         killers: &["integrator::lamps::lamps_of_many_shapes"],
     },
     Mutant {
+        name: "cluster-middle",
+        wrong: "the tree of lights takes clusters for dark whose middle is below the horizon of the surface",
+        file: "shaders/light_tree.glsl",
+        edits: &[(
+            "light_not_negative(cosine + sine + CLUSTER_SLACK)",
+            "light_not_negative(cosine)",
+        )],
+        killers: &["integrator::lamps::points_below_the_floor_hide_none_above"],
+    },
+    Mutant {
         name: "cluster-beam",
         wrong: "the tree of lights takes spots for dark at 10° from their axis",
         file: "shaders/light_tree.glsl",
