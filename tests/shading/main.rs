@@ -71,13 +71,13 @@ fn open() -> Option<Arc<Device>> {
 
 /// SPIR-V of a kernel; with the feature `mutants`, of the changed one that tests/mutants made of it, which is told the names.
 fn spirv(name: &str) -> Vec<u8> {
-    if cfg!(feature = "mutants") {
-        let folder = std::env::var_os("ETENDUE_MUTANT_SPIRV").unwrap_or_default();
+    let planted = std::env::var_os("ETENDUE_MUTANT_SPIRV").filter(|_| cfg!(feature = "mutants"));
+    if let Some(folder) = planted {
         let file = PathBuf::from(folder).join(name);
-        if let Ok(planted) = std::fs::read(file.with_extension("spv")) {
-            return planted;
+        if let Ok(words) = std::fs::read(file.with_extension("spv")) {
+            return words;
         }
-        std::fs::write(file.with_extension("asked"), "").ok();
+        std::fs::write(file.with_extension("asked"), "").unwrap();
     }
     let file = format!("{name}.spv");
     std::fs::read(PathBuf::from(env!("ETENDUE_SHADER_DIR")).join(file)).unwrap()
