@@ -12,17 +12,6 @@ pub type Entry = (&'static str, &'static [&'static str], &'static str);
 pub const SHADERS: &[Entry] = &[
     ("kernel.comp", &["TRAVERSE_SOFTWARE"], "path_software"),
     ("kernel.comp", &["TRAVERSE_QUERY"], "path_query"),
-    // the same for scenes of opaque surfaces
-    (
-        "kernel.comp",
-        &["TRAVERSE_SOFTWARE", "PLAIN"],
-        "path_software_plain",
-    ),
-    (
-        "kernel.comp",
-        &["TRAVERSE_QUERY", "PLAIN"],
-        "path_query_plain",
-    ),
     // for the limit report
     (
         "kernel.comp",
@@ -63,31 +52,17 @@ pub const SHADERS: &[Entry] = &[
     // pixels share what their paths find
     (
         "kernel.comp",
-        &["TRAVERSE_SOFTWARE", "PLAIN", "SHARE"],
+        &["TRAVERSE_SOFTWARE", "SHARE"],
         "share_software",
     ),
-    (
-        "kernel.comp",
-        &["TRAVERSE_QUERY", "PLAIN", "SHARE"],
-        "share_query",
-    ),
+    ("kernel.comp", &["TRAVERSE_QUERY", "SHARE"], "share_query"),
     // traces photons
     (
         "kernel.comp",
         &["TRAVERSE_SOFTWARE", "PHOTON"],
         "photon_software",
     ),
-    (
-        "kernel.comp",
-        &["TRAVERSE_SOFTWARE", "PLAIN", "PHOTON"],
-        "photon_software_plain",
-    ),
     ("kernel.comp", &["TRAVERSE_QUERY", "PHOTON"], "photon_query"),
-    (
-        "kernel.comp",
-        &["TRAVERSE_QUERY", "PLAIN", "PHOTON"],
-        "photon_query_plain",
-    ),
     // for CPUs that gather
     (
         "kernel.comp",
@@ -96,18 +71,8 @@ pub const SHADERS: &[Entry] = &[
     ),
     (
         "kernel.comp",
-        &["TRAVERSE_SOFTWARE", "ADDRESSES", "PLAIN"],
-        "path_software_addresses_plain",
-    ),
-    (
-        "kernel.comp",
         &["TRAVERSE_QUERY", "ADDRESSES"],
         "path_query_addresses",
-    ),
-    (
-        "kernel.comp",
-        &["TRAVERSE_QUERY", "ADDRESSES", "PLAIN"],
-        "path_query_addresses_plain",
     ),
     (
         "kernel.comp",
@@ -116,12 +81,12 @@ pub const SHADERS: &[Entry] = &[
     ),
     (
         "kernel.comp",
-        &["TRAVERSE_SOFTWARE", "ADDRESSES", "PLAIN", "SHARE"],
+        &["TRAVERSE_SOFTWARE", "ADDRESSES", "SHARE"],
         "share_software_addresses",
     ),
     (
         "kernel.comp",
-        &["TRAVERSE_QUERY", "ADDRESSES", "PLAIN", "SHARE"],
+        &["TRAVERSE_QUERY", "ADDRESSES", "SHARE"],
         "share_query_addresses",
     ),
     (
@@ -151,18 +116,8 @@ pub const SHADERS: &[Entry] = &[
     ),
     (
         "kernel.comp",
-        &["TRAVERSE_SOFTWARE", "ADDRESSES", "PLAIN", "PHOTON"],
-        "photon_software_addresses_plain",
-    ),
-    (
-        "kernel.comp",
         &["TRAVERSE_QUERY", "ADDRESSES", "PHOTON"],
         "photon_query_addresses",
-    ),
-    (
-        "kernel.comp",
-        &["TRAVERSE_QUERY", "ADDRESSES", "PLAIN", "PHOTON"],
-        "photon_query_addresses_plain",
     ),
     // as path_software, with what wgpu lacks left out
     ("kernel.comp", &["TRAVERSE_SOFTWARE", "WGPU"], "path_wgpu"),
@@ -172,11 +127,6 @@ pub const SHADERS: &[Entry] = &[
         "path_wgpu_query",
     ),
     ("kernel.rgen", &["TRAVERSE_PIPELINE"], "path_pipeline"),
-    (
-        "kernel.rgen",
-        &["TRAVERSE_PIPELINE", "PLAIN"],
-        "path_pipeline_plain",
-    ),
     (
         "kernel.rgen",
         &["TRAVERSE_PIPELINE", "KERNEL_PROBE"],
@@ -191,11 +141,6 @@ pub const SHADERS: &[Entry] = &[
         "kernel.rgen",
         &["TRAVERSE_PIPELINE", "PHOTON"],
         "photon_pipeline",
-    ),
-    (
-        "kernel.rgen",
-        &["TRAVERSE_PIPELINE", "PLAIN", "PHOTON"],
-        "photon_pipeline_plain",
     ),
     ("trace.rmiss", &[], "trace_miss"),
     ("trace.rchit", &[], "trace_closest_hit"),

@@ -9,7 +9,12 @@
 
 #include "scene.glsl"
 
+#ifdef ADDRESSES
+layout(buffer_reference, scalar, buffer_reference_align = 4) buffer Film { float values[]; };
+#define film Film(addresses[BIND_FILM]).values
+#else
 layout(binding = BIND_FILM, scalar) buffer FilmBlock { float film[]; };
+#endif
 
 // Levels of the tree that one batch can hold: up to 2^(FILM_LEVELS − 1) samples.
 const uint FILM_LEVELS = 9u;

@@ -4,8 +4,15 @@
 #include "invocation.glsl"
 #include "path.glsl"
 
+#ifdef ADDRESSES
+layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer PhotonStarts { PhotonStart list[]; };
+layout(buffer_reference, scalar, buffer_reference_align = 4) writeonly buffer Photons { Photon list[]; };
+#define photon_starts PhotonStarts(addresses[BIND_PHOTON_STARTS]).list
+#define photons Photons(addresses[BIND_PHOTONS]).list
+#else
 layout(binding = BIND_PHOTON_STARTS, scalar) readonly buffer PhotonStartsBlock { PhotonStart photon_starts[]; };
 layout(binding = BIND_PHOTONS, scalar) writeonly buffer PhotonsBlock { Photon photons[]; };
+#endif
 
 layout(push_constant, scalar) uniform BatchBlock { Batch batch; };
 

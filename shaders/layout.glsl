@@ -121,6 +121,7 @@ struct Plane {
     uint reserved_1;
     uint reserved_2;
 };
+const uint PLANE_TEXELS = 5u;
 const uint PLANES_MAX = 32u;
 const uint SMALL_TEXELS = 4096u; // of a uniform buffer of 64 KiB
 
@@ -388,17 +389,17 @@ const uint BIND_BVH_TRIANGLES = 15u; // texel buffer RGBA32UI, three texels a tr
 const uint BIND_MEDIA = 16u;         // texel buffer RGBA32UI: Medium[]
 const uint BIND_PROBE_RAYS = 17u;    // storage: ProbeRay[] (probe kernel)
 const uint BIND_PROBE_HITS = 18u;    // storage: ProbeHit[] (probe kernel)
-const uint BIND_PLANES = 19u;        // uniform buffer: Plane[PLANES_MAX] (own BVH)
+const uint BIND_PLANES = 19u;        // texel buffer RGBA32UI: Plane[], PLANES_MAX at most (own BVH)
 const uint BIND_SMALL_NODES = 20u;   // uniform buffer: SMALL_TEXELS of BIND_BVH_NODES, with HAS_SMALL_NODES
 const uint BIND_SMALL_RECORDS = 21u; // uniform buffer: SMALL_TEXELS of BIND_BVH_TRIANGLES, with HAS_SMALL_RECORDS
 const uint BIND_ALLOTMENT = 22u;     // texel buffer R32UI: an exponent for each pixel of the window, with HAS_ALLOTMENT
-const uint BIND_ADDRESSES = 23u;     // uniform buffer: addresses of texel buffers by their bindings (ADDRESSES)
+const uint BIND_ADDRESSES = 23u;     // uniform buffer: addresses of buffers by their bindings (ADDRESSES)
 const uint BIND_STREAM = 24u;        // texel buffer RGBA32UI: StreamRay[]; storage in the kernel that records
 const uint BIND_STREAM_STARTS = 25u; // texel buffer R32UI: where the rays of each pixel begin and, one more, where they end
 const uint BIND_STREAM_COUNTS = 26u; // storage: rays of each pixel (kernel that records)
 const uint BIND_GUIDE = 27u;         // texel buffer RGBA32UI: the tree, with HAS_GUIDE
 const uint BIND_PHOTON_STARTS = 28u; // storage: PhotonStart[] (photon kernel)
 const uint BIND_PHOTONS = 29u;       // storage: Photon[] (photon kernel)
-const uint ADDRESSES_SIZE = 28u;
+const uint ADDRESSES_SIZE = 30u;
 
 #endif

@@ -8,7 +8,12 @@
 #include "scene.glsl"
 
 layout(push_constant, scalar) uniform BatchBlock { Batch batch; };
+#ifdef ADDRESSES
+layout(buffer_reference, scalar, buffer_reference_align = 4) buffer Ledger { uint counts[]; };
+#define ledger Ledger(addresses[BIND_LEDGER]).counts
+#else
 layout(binding = BIND_LEDGER, scalar) buffer LedgerBlock { uint ledger[]; };
+#endif
 
 // Place in the 8 × 8 tile: eight neighbours in the index are a block of 4 × 2 pixels, so that a subgroup stays together.
 uvec2 pixels_place(uint i)

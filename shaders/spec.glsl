@@ -16,8 +16,8 @@ layout(constant_id = 8) const bool HAS_PUNCTUAL = true;    // point, spot, direc
 layout(constant_id = 9) const bool HAS_INSTANCES = true;   // groups that are not in world space
 layout(constant_id = 10) const bool HAS_AOVS = true;
 layout(constant_id = 12) const bool HAS_PASSAGE = true;    // shadow rays go through surfaces that let light straight through
-#ifdef PLAIN
-// Scenes of opaque surfaces: what drivers need not read they need not prune at every start.
+#ifdef SHARE
+// Pixels share in scenes of opaque surfaces only.
 const bool HAS_DIELECTRIC = false;
 const bool HAS_NESTED = false;
 const bool HAS_INSIDE = false;

@@ -12,14 +12,28 @@
 
 const uint PLANE_COUNT = PARALLELOGRAM_COUNT + TRIANGLE_COUNT;
 
-layout(binding = BIND_PLANES, scalar) uniform PlanesBlock { Plane planes_given[PLANES_MAX]; };
+#ifdef ADDRESSES
+#define planes_given(i) scene_quad(BIND_PLANES, i)
+#else
+layout(binding = BIND_PLANES) uniform usamplerBuffer planes_given;
+#endif
 
-// The same for as long as the invocation runs: lavapipe checks each load from a buffer against its size, which takes
-// longer than the test.
+// For as long as the invocation runs: lavapipe makes a branch for each word of a uniform buffer, which takes longer than the
+// test, and a kernel that has hundreds compiles long.
 Plane planes[PLANES_MAX];
 
 void planes_read() {
-    [[unroll]] for (uint i = 0u; i < PLANE_COUNT; i++) planes[i] = planes_given[i];
+    [[unroll]] for (uint i = 0u; i < PLANE_COUNT; i++) {
+        int at = int(PLANE_TEXELS * i);
+        uvec4 a = texelFetch(planes_given, at);
+        uvec4 b = texelFetch(planes_given, at + 1);
+        uvec4 c = texelFetch(planes_given, at + 2);
+        uvec4 d = texelFetch(planes_given, at + 3);
+        uvec4 e = texelFetch(planes_given, at + 4);
+        planes[i] = Plane(uintBitsToFloat(a.xyz), uintBitsToFloat(a.w), uintBitsToFloat(b.xyz), uintBitsToFloat(b.w),
+                          uintBitsToFloat(c.xyz), uintBitsToFloat(c.w), uintBitsToFloat(d.x), uintBitsToFloat(d.y), d.z, d.w,
+                          e.x, 0u, 0u, 0u);
+    }
 }
 
 // A ray, and what is known of it.

@@ -19,6 +19,8 @@ pub mod scene;
 pub mod selftest;
 pub mod settings;
 pub mod spec;
+#[doc(hidden)]
+pub mod spirv;
 mod store;
 pub mod tails;
 #[cfg(feature = "wgpu")]

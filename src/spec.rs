@@ -72,10 +72,9 @@ pub struct Spec {
     pub share: bool,
 }
 
-/// Features that plain kernels are compiled without (`PLAIN` in `shaders/spec.glsl`): these are half as
-/// long, and drivers read a kernel at every start.
+/// Features that kernels of pixels that share are compiled without (`SHARE` in `shaders/spec.glsl`).
 #[doc(hidden)]
-pub const NOT_PLAIN: [&str; 7] = [
+pub const NOT_SHARED: [&str; 7] = [
     "dielectric",
     "nested",
     "inside",
@@ -177,15 +176,10 @@ impl Spec {
         self.alpha || self.nested
     }
 
-    /// Whether the plain kernel does.
-    pub(crate) fn is_plain(&self) -> bool {
-        let mut on = self.features().into_iter().filter(|(_, on)| *on);
-        !on.any(|(name, _)| NOT_PLAIN.contains(&name))
-    }
-
     /// Whether pixels share: that is asked for, and shadow rays tell all of what is between two surfaces.
     pub(crate) fn shares(&self) -> bool {
-        self.share && self.is_plain() && !self.passage
+        let mut on = self.features().into_iter().filter(|(_, on)| *on);
+        self.share && !self.passage && !on.any(|(name, _)| NOT_SHARED.contains(&name))
     }
 
     /// Names of the features with their state, for people and files.
@@ -307,22 +301,12 @@ macro_rules! kernel {
 pub(crate) mod kernels {
     use super::Kernel;
 
-    /// By texel buffers and by addresses; with everything and without [`super::NOT_PLAIN`].
-    pub(crate) const PATH_SOFTWARE: [[Kernel; 2]; 2] = [
-        [kernel!("path_software"), kernel!("path_software_plain")],
-        [
-            kernel!("path_software_addresses"),
-            kernel!("path_software_addresses_plain"),
-        ],
-    ];
-    pub(crate) const PATH_QUERY: [[Kernel; 2]; 2] = [
-        [kernel!("path_query"), kernel!("path_query_plain")],
-        [
-            kernel!("path_query_addresses"),
-            kernel!("path_query_addresses_plain"),
-        ],
-    ];
-    /// As `PATH_SOFTWARE` with everything, and counts what traversal does.
+    /// By texel buffers and by addresses.
+    pub(crate) const PATH_SOFTWARE: [Kernel; 2] =
+        [kernel!("path_software"), kernel!("path_software_addresses")];
+    pub(crate) const PATH_QUERY: [Kernel; 2] =
+        [kernel!("path_query"), kernel!("path_query_addresses")];
+    /// As `PATH_SOFTWARE`, and counts what traversal does.
     pub(crate) const PATH_COUNTS: [Kernel; 2] =
         [kernel!("path_counts"), kernel!("path_addresses_counts")];
     /// The same, and keeps every ray with what it met; by texel buffers alone.
@@ -330,7 +314,7 @@ pub(crate) mod kernels {
     /// The same, and looks up what rays meet.
     pub(crate) const PATH_RECALL: [Kernel; 2] =
         [kernel!("path_recall"), kernel!("path_addresses_recall")];
-    /// Pixels share what their paths find; plain.
+    /// Pixels share what their paths find.
     pub(crate) const SHARE_SOFTWARE: [Kernel; 2] = [
         kernel!("share_software"),
         kernel!("share_software_addresses"),
@@ -357,24 +341,14 @@ pub(crate) mod kernels {
     #[cfg(feature = "wgpu")]
     pub(crate) const PATH_WGPU_QUERY: Kernel = kernel!("path_wgpu_query");
     /// Traces photons.
-    pub(crate) const PHOTON_SOFTWARE: [[Kernel; 2]; 2] = [
-        [kernel!("photon_software"), kernel!("photon_software_plain")],
-        [
-            kernel!("photon_software_addresses"),
-            kernel!("photon_software_addresses_plain"),
-        ],
+    pub(crate) const PHOTON_SOFTWARE: [Kernel; 2] = [
+        kernel!("photon_software"),
+        kernel!("photon_software_addresses"),
     ];
-    pub(crate) const PHOTON_QUERY: [[Kernel; 2]; 2] = [
-        [kernel!("photon_query"), kernel!("photon_query_plain")],
-        [
-            kernel!("photon_query_addresses"),
-            kernel!("photon_query_addresses_plain"),
-        ],
-    ];
-    pub(crate) const PHOTON_PIPELINE: [Kernel; 2] =
-        [kernel!("photon_pipeline"), kernel!("photon_pipeline_plain")];
-    pub(crate) const PATH_PIPELINE: [Kernel; 2] =
-        [kernel!("path_pipeline"), kernel!("path_pipeline_plain")];
+    pub(crate) const PHOTON_QUERY: [Kernel; 2] =
+        [kernel!("photon_query"), kernel!("photon_query_addresses")];
+    pub(crate) const PHOTON_PIPELINE: Kernel = kernel!("photon_pipeline");
+    pub(crate) const PATH_PIPELINE: Kernel = kernel!("path_pipeline");
     pub(crate) const PROBE_PIPELINE: Kernel = kernel!("probe_pipeline");
     /// What the ray generation shaders call.
     pub(crate) const TRACE_MISS: Kernel = kernel!("trace_miss");

@@ -14,7 +14,8 @@ const MAY_USE: &[(&str, &[&str])] = &[
     ("error", &[]),
     ("layout", &[]),
     ("fault", &[]),
-    ("gpu", &["error", "fault"]),
+    ("spirv", &[]),
+    ("gpu", &["error", "fault", "spirv"]),
     ("bvh", &["error"]),
     ("guide", &["layout"]),
     ("chart", &[]),
@@ -28,7 +29,7 @@ const MAY_USE: &[(&str, &[&str])] = &[
     ("compare", &["error", "image_io", "tails"]),
     ("checkpoint", &["error", "film", "image_io", "settings"]),
     ("spec", &["mutant", "scene", "settings"]),
-    ("wgpu", &["error", "gpu", "settings"]),
+    ("wgpu", &["error", "gpu", "settings", "spirv"]),
     (
         "selftest",
         &[

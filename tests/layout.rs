@@ -162,16 +162,17 @@ fn features_switch_the_constant_of_their_name() {
     }
 }
 
-/// What a plain kernel leaves out is what makes a scene take the other one.
+/// What kernels of pixels that share leave out is what makes a scene take the other ones.
 #[test]
-fn plain_kernels_leave_out_solids_media_and_meters() {
-    for kernel in ["path_software", "path_query", "path_pipeline"] {
-        let of = |name: &str| Module::read(name).spec_numbers();
-        let (whole, plain) = (of(kernel), of(&format!("{kernel}_plain")));
+fn sharing_kernels_leave_out_solids_media_and_meters() {
+    for kernel in ["software", "query"] {
+        let of = |name: &str| Module::read(&format!("{name}_{kernel}")).spec_numbers();
+        let (whole, shared) = (of("path"), of("share"));
         let features = Spec::default().features();
-        let missing = whole.iter().filter(|id| !plain.contains(id));
-        let missing: Vec<_> = missing.map(|&id| features[id as usize].0).collect();
-        assert_eq!(missing, etendue::spec::NOT_PLAIN, "{kernel}");
+        let missing = whole.iter().filter(|id| !shared.contains(id));
+        let missing = missing.filter_map(|&id| Some(features.get(id as usize)?.0));
+        let missing: Vec<_> = missing.collect();
+        assert_eq!(missing, etendue::spec::NOT_SHARED, "{kernel}");
     }
 }
 

@@ -1,7 +1,7 @@
 //! Buffers: memory that shaders see. A [`Buffer`] is a cheap handle; the memory
 //! is freed with the last one.
 
-use std::sync::Arc;
+use std::sync::{Arc, Mutex, PoisonError};
 
 use ash::vk;
 use bytemuck::Pod;
@@ -41,7 +41,8 @@ struct Inner {
     device: Arc<Device>,
     name: String,
     raw: vk::Buffer,
-    view: vk::BufferView,
+    /// Made when it is first asked for: lavapipe compiles for each.
+    view: Mutex<vk::BufferView>,
     allocation: Option<Allocation>,
     bytes: u64,
     usage: Usage,
@@ -53,7 +54,8 @@ impl Drop for Inner {
         // SAFETY: recordings hold their buffers and `run` has waited, so nothing uses them;
         // destroying a null handle does nothing. The view goes before its buffer.
         unsafe {
-            self.device.raw().destroy_buffer_view(self.view, None);
+            let view = self.view.get_mut().unwrap_or_else(PoisonError::into_inner);
+            self.device.raw().destroy_buffer_view(*view, None);
             self.device.raw().destroy_buffer(self.raw, None);
         }
         if let Some(allocation) = self.allocation.take() {
@@ -116,14 +118,13 @@ impl Buffer {
             device: Arc::clone(device),
             name: name.to_owned(),
             raw,
-            view: vk::BufferView::null(),
+            view: Mutex::new(vk::BufferView::null()),
             allocation: None,
             bytes,
             usage,
             memory,
         };
         inner.allocate()?;
-        inner.create_view()?;
         device.set_name(raw, name);
         Ok(Self(Arc::new(inner)))
     }
@@ -211,8 +212,13 @@ impl Buffer {
         self.0.raw
     }
 
-    pub(super) fn view(&self) -> vk::BufferView {
-        self.0.view
+    /// The view of a texel buffer; null of others.
+    pub(super) fn view(&self) -> Result<vk::BufferView> {
+        let mut view = self.0.view.lock().unwrap_or_else(PoisonError::into_inner);
+        if *view == vk::BufferView::null() {
+            *view = self.0.create_view()?;
+        }
+        Ok(*view)
     }
 
     pub(super) fn usage(&self) -> Usage {
@@ -335,9 +341,9 @@ impl Inner {
             .map_err(|result| allocation_failed(&self.name, self.bytes, result))
     }
 
-    fn create_view(&mut self) -> Result<()> {
+    fn create_view(&self) -> Result<vk::BufferView> {
         let Some(format) = self.usage.texel else {
-            return Ok(());
+            return Ok(vk::BufferView::null());
         };
         let info = vk::BufferViewCreateInfo::default()
             .buffer(self.raw)
@@ -345,9 +351,8 @@ impl Inner {
             .range(vk::WHOLE_SIZE);
         // SAFETY: the buffer has the usage and memory; its size is a multiple of the texel's and
         // within the limit. These three formats are mandatory for uniform texel buffers.
-        self.view = unsafe { self.device.raw().create_buffer_view(&info, None) }
-            .map_err(|result| allocation_failed(&self.name, self.bytes, result))?;
-        Ok(())
+        unsafe { self.device.raw().create_buffer_view(&info, None) }
+            .map_err(|result| allocation_failed(&self.name, self.bytes, result))
     }
 }
 

@@ -15,8 +15,8 @@
 //!    (a missing binding, a range past the end) is a panic that says which.
 //! 5. **Shaders are trusted.** The SPIR-V given to [`Pipeline`] is
 //!    compiled by this crate's build script; that it stays within its buffers is
-//!    proved by tests and validation, not by this module. What it reads by an
-//!    address is bound as well, which keeps it alive.
+//!    proved by tests and validation, not by this module. What it reads or writes
+//!    by an address is held by its bind set, which keeps it alive.
 //!
 //! Beside Vulkan, [`widen_vectors`] changes the environment, while the process has a single thread.
 #![allow(

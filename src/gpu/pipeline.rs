@@ -12,6 +12,7 @@ use super::failed;
 use super::kept::Recipe;
 use super::rays::ShaderTable;
 use crate::error::{Error, Result};
+use crate::spirv;
 
 /// What a shader expects at a binding.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -22,24 +23,27 @@ pub enum BindingKind {
     Storage,
     /// A uniform texel buffer.
     Texel,
+    /// Nothing: the shader finds the buffer by its address, sets keep it alive.
+    Address,
     /// A top-level acceleration structure.
     AccelerationStructure,
 }
 
 impl BindingKind {
-    const ALL: [Self; 4] = [
+    const DESCRIPTORS: [Self; 4] = [
         Self::Uniform,
         Self::Storage,
         Self::Texel,
         Self::AccelerationStructure,
     ];
 
-    fn vulkan(self) -> vk::DescriptorType {
+    fn vulkan(self) -> Option<vk::DescriptorType> {
         match self {
-            Self::Uniform => vk::DescriptorType::UNIFORM_BUFFER,
-            Self::Storage => vk::DescriptorType::STORAGE_BUFFER,
-            Self::Texel => vk::DescriptorType::UNIFORM_TEXEL_BUFFER,
-            Self::AccelerationStructure => vk::DescriptorType::ACCELERATION_STRUCTURE_KHR,
+            Self::Uniform => Some(vk::DescriptorType::UNIFORM_BUFFER),
+            Self::Storage => Some(vk::DescriptorType::STORAGE_BUFFER),
+            Self::Texel => Some(vk::DescriptorType::UNIFORM_TEXEL_BUFFER),
+            Self::Address => None,
+            Self::AccelerationStructure => Some(vk::DescriptorType::ACCELERATION_STRUCTURE_KHR),
         }
     }
 }
@@ -112,49 +116,26 @@ impl Drop for Module<'_> {
 }
 
 impl<'a> Module<'a> {
-    pub(super) fn new(device: &'a Device, spirv: &[u32]) -> Result<Self, vk::Result> {
-        let info = vk::ShaderModuleCreateInfo::default().code(spirv);
+    pub(super) fn new(
+        device: &'a Device,
+        spirv: &[u32],
+        constants: &[(u32, u32)],
+    ) -> Result<Self, vk::Result> {
+        let spirv = spirv::specialised(spirv, constants);
+        let info = vk::ShaderModuleCreateInfo::default().code(&spirv);
         // SAFETY: the module is trusted (see the safety policy in mod.rs).
         let raw = unsafe { device.raw().create_shader_module(&info, None) }?;
         Ok(Self { device, raw })
     }
 
-    pub(super) fn entry<'b>(
+    pub(super) fn entry(
         &self,
         stage: vk::ShaderStageFlags,
-        constants: &'b vk::SpecializationInfo<'b>,
-    ) -> vk::PipelineShaderStageCreateInfo<'b> {
+    ) -> vk::PipelineShaderStageCreateInfo<'static> {
         vk::PipelineShaderStageCreateInfo::default()
             .stage(stage)
             .module(self.raw)
             .name(c"main")
-            .specialization_info(constants)
-    }
-}
-
-/// Specialisation constants as Vulkan reads them. A module ignores those that it lacks.
-pub(super) struct Constants {
-    entries: Vec<vk::SpecializationMapEntry>,
-    values: Vec<u32>,
-}
-
-impl Constants {
-    pub(super) fn new(constants: &[(u32, u32)]) -> Self {
-        let entry = |(index, &(id, _)): (u32, &(u32, u32))| vk::SpecializationMapEntry {
-            constant_id: id,
-            offset: index * 4,
-            size: 4,
-        };
-        Self {
-            entries: (0..).zip(constants).map(entry).collect(),
-            values: constants.iter().map(|&(_, value)| value).collect(),
-        }
-    }
-
-    pub(super) fn info(&self) -> vk::SpecializationInfo<'_> {
-        vk::SpecializationInfo::default()
-            .map_entries(&self.entries)
-            .data(bytemuck::cast_slice(&self.values))
     }
 }
 
@@ -280,12 +261,13 @@ impl PipelineInner {
         let bindings: Vec<_> = self
             .bindings
             .iter()
-            .map(|&(binding, kind)| {
-                vk::DescriptorSetLayoutBinding::default()
+            .filter_map(|&(binding, kind)| {
+                let binding = vk::DescriptorSetLayoutBinding::default()
                     .binding(binding)
-                    .descriptor_type(kind.vulkan())
+                    .descriptor_type(kind.vulkan()?)
                     .descriptor_count(1)
-                    .stage_flags(self.stages)
+                    .stage_flags(self.stages);
+                Some(binding)
             })
             .collect();
         let info = vk::DescriptorSetLayoutCreateInfo::default().bindings(&bindings);
@@ -306,10 +288,8 @@ impl PipelineInner {
 
     fn compile(&mut self, desc: &PipelineDesc<'_>) -> Result<(), vk::Result> {
         let device = self.device.raw();
-        let module = Module::new(&self.device, desc.spirv)?;
-        let constants = Constants::new(desc.constants);
-        let specialisation = constants.info();
-        let stage = module.entry(vk::ShaderStageFlags::COMPUTE, &specialisation);
+        let module = Module::new(&self.device, desc.spirv, desc.constants)?;
+        let stage = module.entry(vk::ShaderStageFlags::COMPUTE);
         let info = vk::ComputePipelineCreateInfo::default()
             .stage(stage)
             .layout(self.layout);
@@ -379,7 +359,7 @@ impl BindSet {
                     pipeline.name()
                 )
             });
-            inner.write(binding, kind, resource);
+            inner.write(binding, kind, resource)?;
         }
         pipeline.0.device.set_name(inner.raw, name);
         Ok(Self(Arc::new(inner)))
@@ -402,11 +382,14 @@ impl SetInner {
     fn allocate(&mut self) -> Result<(), vk::Result> {
         let pipeline = &self.pipeline.0;
         let device = pipeline.device.raw();
-        let sizes: Vec<_> = BindingKind::ALL
+        let count = |kind| pipeline.bindings.iter().filter(|b| b.1 == kind).count();
+        let sizes: Vec<_> = BindingKind::DESCRIPTORS
             .into_iter()
-            .map(|kind| vk::DescriptorPoolSize {
-                ty: kind.vulkan(),
-                descriptor_count: pipeline.bindings.iter().filter(|b| b.1 == kind).count() as u32,
+            .filter_map(|kind| {
+                Some(vk::DescriptorPoolSize {
+                    ty: kind.vulkan()?,
+                    descriptor_count: count(kind) as u32,
+                })
             })
             .filter(|size| size.descriptor_count > 0)
             .collect();
@@ -424,7 +407,7 @@ impl SetInner {
         Ok(())
     }
 
-    fn write(&mut self, binding: u32, kind: BindingKind, resource: Resource<'_>) {
+    fn write(&mut self, binding: u32, kind: BindingKind, resource: Resource<'_>) -> Result<()> {
         let device = Arc::clone(&self.pipeline.0.device);
         self.check(binding, kind, resource);
         let mut buffers = [vk::DescriptorBufferInfo::default()];
@@ -437,7 +420,9 @@ impl SetInner {
                     offset: 0,
                     range: vk::WHOLE_SIZE,
                 };
-                views[0] = buffer.view();
+                if kind == BindingKind::Texel {
+                    views[0] = buffer.view()?;
+                }
                 self._buffers.push(buffer.clone());
             }
             Resource::Acceleration(tlas) => {
@@ -450,16 +435,21 @@ impl SetInner {
         let mut write = vk::WriteDescriptorSet::default()
             .dst_set(self.raw)
             .dst_binding(binding)
-            .descriptor_type(kind.vulkan())
             .descriptor_count(1);
         write = match kind {
             BindingKind::Uniform | BindingKind::Storage => write.buffer_info(&buffers),
             BindingKind::Texel => write.texel_buffer_view(&views),
+            BindingKind::Address => write,
             BindingKind::AccelerationStructure => write.push_next(&mut scene_write),
         };
+        let Some(ty) = kind.vulkan() else {
+            return Ok(());
+        };
+        write = write.descriptor_type(ty);
         // SAFETY: `check` has compared kinds, usages and devices; the set is not in use yet and
         // its resources are kept by `self`.
         unsafe { device.raw().update_descriptor_sets(&[write], &[]) };
+        Ok(())
     }
 
     fn check(&self, binding: u32, kind: BindingKind, resource: Resource<'_>) {
@@ -470,6 +460,7 @@ impl SetInner {
                     BindingKind::Uniform => vk::BufferUsageFlags::UNIFORM_BUFFER,
                     BindingKind::Storage => vk::BufferUsageFlags::STORAGE_BUFFER,
                     BindingKind::Texel => vk::BufferUsageFlags::UNIFORM_TEXEL_BUFFER,
+                    BindingKind::Address => vk::BufferUsageFlags::SHADER_DEVICE_ADDRESS,
                     BindingKind::AccelerationStructure => vk::BufferUsageFlags::empty(),
                 };
                 let fits = !flag.is_empty() && buffer.usage().allows(flag);

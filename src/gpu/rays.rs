@@ -10,7 +10,7 @@ use super::commands::Commands;
 use super::device::Device;
 use super::failed;
 use super::kept::Recipe;
-use super::pipeline::{BindSet, Constants, Module, Pipeline, PipelineDesc, PipelineInner};
+use super::pipeline::{BindSet, Module, Pipeline, PipelineDesc, PipelineInner};
 use super::usage::Usage;
 use crate::error::{Error, Result};
 
@@ -88,15 +88,13 @@ fn create(
     sources.extend(optional);
     let modules = sources
         .iter()
-        .map(|(_, spirv)| Module::new(device, spirv))
+        .map(|(_, spirv)| Module::new(device, spirv, desc.constants))
         .collect::<Result<Vec<_>, _>>()
         .map_err(op())?;
-    let constants = Constants::new(desc.constants);
-    let specialisation = constants.info();
     let entries: Vec<_> = sources
         .iter()
         .zip(&modules)
-        .map(|(&(stage, _), module)| module.entry(stage, &specialisation))
+        .map(|(&(stage, _), module)| module.entry(stage))
         .collect();
     let group = vk::RayTracingShaderGroupCreateInfoKHR::default()
         .ty(vk::RayTracingShaderGroupTypeKHR::GENERAL)

@@ -10,7 +10,7 @@ use glam::DVec3;
 
 use super::traversal::{GROUP, Traversal};
 use super::upload::SceneData;
-use super::vulkan::{Input, bind, upload};
+use super::vulkan::{Input, bind, find, note_addresses, upload};
 use crate::error::Result;
 use crate::gpu::{BindingKind, Buffer, Device, Memory, Pipeline, Usage};
 use crate::guide;
@@ -32,7 +32,6 @@ pub(super) fn guide(
     spec: &Spec,
     shared: &[Input],
     data: &SceneData,
-    by_address: bool,
     compile: impl Fn(&Spec) -> Result<Pipeline> + Sync,
 ) -> Result<Option<(Vec<guide::Texel>, Pipeline)>> {
     let starts = starts(data);
@@ -41,7 +40,7 @@ pub(super) fn guide(
     }
     let (texels, pipeline) = thread::scope(|scope| {
         let pipeline = scope.spawn(|| compile(spec));
-        let texels = trace(device, traversal, spec, shared, &starts, by_address);
+        let texels = trace(device, traversal, spec, shared, &starts);
         (texels, pipeline.join())
     });
     let pipeline = pipeline.unwrap_or_else(|panic| resume_unwind(panic));
@@ -58,32 +57,38 @@ fn trace(
     spec: &Spec,
     shared: &[Input],
     starts: &[PhotonStart],
-    by_address: bool,
 ) -> Result<Option<Vec<guide::Texel>>> {
     let spec = Spec {
         guide: false,
         ..*spec
     };
-    let storage = BindingKind::Storage;
+    let table = find(shared, layout::BIND_ADDRESSES);
+    let (usage, storage) = match table {
+        Some(_) => (Usage::STORAGE | Usage::ADDRESS, BindingKind::Address),
+        None => (Usage::STORAGE, BindingKind::Storage),
+    };
     let mut bindings: Vec<_> = shared.iter().map(|(at, kind, _)| (*at, *kind)).collect();
     bindings.extend([
         (layout::BIND_PHOTON_STARTS, storage),
         (layout::BIND_PHOTONS, storage),
     ]);
-    bindings.extend(traversal.bindings());
-    let pipeline = traversal.photon_pipeline(device, &spec, &bindings, by_address)?;
-    let input = upload(device, "photon starts", starts)?;
+    bindings.extend(traversal.bindings(table.is_some()));
+    let pipeline = traversal.photon_pipeline(device, &spec, &bindings, table.is_some())?;
+    let input = upload(device, "photon starts", starts, usage)?;
     let output = Buffer::new(
         device,
         "photons",
         (starts.len() * size_of::<Photon>()) as u64,
-        Usage::STORAGE,
+        usage,
         Memory::DeviceLocal,
     )?;
     let others = [
         (layout::BIND_PHOTON_STARTS, &input),
         (layout::BIND_PHOTONS, &output),
     ];
+    if let Some(table) = table {
+        note_addresses(table, others.into_iter())?;
+    }
     let set = bind(&pipeline, "photons", shared, &others, traversal)?;
     let push = layout::Batch {
         sample_count: starts.len() as u32,

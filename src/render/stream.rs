@@ -133,9 +133,13 @@ pub(super) fn inputs(
     study: Study,
     usage: Usage,
 ) -> Result<[Input; 3]> {
+    let array = match usage == Usage::ADDRESS {
+        true => BindingKind::Address,
+        false => BindingKind::Texel,
+    };
     let kind = match study {
         Study::Record => BindingKind::Storage,
-        _ => BindingKind::Texel,
+        _ => array,
     };
     let rays = texel(
         device,
@@ -156,7 +160,7 @@ pub(super) fn inputs(
     )?;
     Ok([
         (layout::BIND_STREAM, kind, rays),
-        (layout::BIND_STREAM_STARTS, BindingKind::Texel, starts),
+        (layout::BIND_STREAM_STARTS, array, starts),
         (layout::BIND_STREAM_COUNTS, BindingKind::Storage, counts),
     ])
 }

@@ -134,15 +134,21 @@ pub(super) enum Traversal {
 
 impl Traversal {
     /// What it adds to a kernel's bindings.
-    pub fn bindings(&self) -> Vec<(u32, BindingKind)> {
+    pub fn bindings(&self, by_address: bool) -> Vec<(u32, BindingKind)> {
         match self {
-            Self::Software { .. } => vec![
-                (layout::BIND_BVH_NODES, BindingKind::Texel),
-                (layout::BIND_BVH_TRIANGLES, BindingKind::Texel),
-                (layout::BIND_PLANES, BindingKind::Uniform),
-                (layout::BIND_SMALL_NODES, BindingKind::Uniform),
-                (layout::BIND_SMALL_RECORDS, BindingKind::Uniform),
-            ],
+            Self::Software { .. } => {
+                let array = match by_address {
+                    true => BindingKind::Address,
+                    false => BindingKind::Texel,
+                };
+                vec![
+                    (layout::BIND_BVH_NODES, array),
+                    (layout::BIND_BVH_TRIANGLES, array),
+                    (layout::BIND_PLANES, array),
+                    (layout::BIND_SMALL_NODES, BindingKind::Uniform),
+                    (layout::BIND_SMALL_RECORDS, BindingKind::Uniform),
+                ]
+            }
             Self::Query { .. } | Self::Pipeline { .. } => {
                 vec![(layout::BIND_SCENE, BindingKind::AccelerationStructure)]
             }
@@ -171,12 +177,18 @@ impl Traversal {
         }
     }
 
-    /// Its texel buffers.
-    pub fn texel_buffers(&self) -> Vec<(u32, &Buffer)> {
+    /// Its arrays.
+    pub fn arrays(&self) -> Vec<(u32, &Buffer)> {
         match self {
-            Self::Software { nodes, records, .. } => vec![
+            Self::Software {
+                nodes,
+                records,
+                planes,
+                ..
+            } => vec![
                 (layout::BIND_BVH_NODES, nodes),
                 (layout::BIND_BVH_TRIANGLES, records),
+                (layout::BIND_PLANES, planes),
             ],
             Self::Query { .. } | Self::Pipeline { .. } => Vec::new(),
         }
@@ -191,7 +203,7 @@ impl Traversal {
         study: Study,
         by_address: bool,
     ) -> Result<Pipeline> {
-        let (address, plain) = (usize::from(by_address), usize::from(spec.is_plain()));
+        let address = usize::from(by_address);
         let kernel = match (self, study) {
             (Self::Software { .. }, Study::Counts) => kernels::PATH_COUNTS[address],
             (Self::Software { .. }, Study::Record) => kernels::PATH_RECORD,
@@ -202,9 +214,9 @@ impl Traversal {
             (Self::Pipeline { .. }, Study::Replay) => kernels::REPLAY_PIPELINE,
             (Self::Software { .. }, _) if spec.shares() => kernels::SHARE_SOFTWARE[address],
             (Self::Query { .. }, _) if spec.shares() => kernels::SHARE_QUERY[address],
-            (Self::Software { .. }, _) => kernels::PATH_SOFTWARE[address][plain],
-            (Self::Query { .. }, _) => kernels::PATH_QUERY[address][plain],
-            (Self::Pipeline { .. }, _) => kernels::PATH_PIPELINE[plain],
+            (Self::Software { .. }, _) => kernels::PATH_SOFTWARE[address],
+            (Self::Query { .. }, _) => kernels::PATH_QUERY[address],
+            (Self::Pipeline { .. }, _) => kernels::PATH_PIPELINE,
         };
         self.pipeline(device, "path", kernel, spec, bindings)
     }
@@ -217,11 +229,11 @@ impl Traversal {
         bindings: &[(u32, BindingKind)],
         by_address: bool,
     ) -> Result<Pipeline> {
-        let (address, plain) = (usize::from(by_address), usize::from(spec.is_plain()));
+        let address = usize::from(by_address);
         let kernel = match self {
-            Self::Software { .. } => kernels::PHOTON_SOFTWARE[address][plain],
-            Self::Query { .. } => kernels::PHOTON_QUERY[address][plain],
-            Self::Pipeline { .. } => kernels::PHOTON_PIPELINE[plain],
+            Self::Software { .. } => kernels::PHOTON_SOFTWARE[address],
+            Self::Query { .. } => kernels::PHOTON_QUERY[address],
+            Self::Pipeline { .. } => kernels::PHOTON_PIPELINE,
         };
         self.pipeline(device, "photons", kernel, spec, bindings)
     }
@@ -320,12 +332,10 @@ pub(super) fn upload_bvh(
     spec: &Spec,
     usage: Usage,
 ) -> Result<Traversal> {
-    let mut all = [layout::Plane::default(); layout::PLANES_MAX as usize];
-    all[..planes.len()].copy_from_slice(planes);
     Ok(Traversal::Software {
         nodes: texel(device, "bvh nodes", RECORDS, &bvh.nodes, usage)?,
         records: texel(device, "bvh triangles", RECORDS, &bvh.triangles, usage)?,
-        planes: Buffer::from_slice(device, "planes", Usage::UNIFORM, &all)?,
+        planes: texel(device, "planes", RECORDS, planes, usage)?,
         small_nodes: small(device, "small nodes", &bvh.nodes, spec.small_nodes)?,
         small_records: small(device, "small records", &bvh.triangles, spec.small_records)?,
     })

@@ -111,10 +111,24 @@ impl VulkanBackend {
             && tuning
                 .addresses
                 .unwrap_or(is_cpu && gathers_fast(device.caps().subgroup_size));
-        let usage = match by_address {
-            true => Usage::ADDRESS,
-            false => Usage::default(),
+        let (usage, array, storage) = match by_address {
+            true => (Usage::ADDRESS, BindingKind::Address, BindingKind::Address),
+            false => (Usage::default(), BindingKind::Texel, BindingKind::Storage),
         };
+        let film = Buffer::new(
+            device,
+            "film",
+            film_bytes,
+            Usage::STORAGE | usage,
+            gpu::Memory::DeviceLocal,
+        )?;
+        let ledger = Buffer::new(
+            device,
+            "ledger",
+            u64::from(layout::LEDGER_SIZE) * 4,
+            Usage::STORAGE | usage,
+            gpu::Memory::DeviceLocal,
+        )?;
         let mut instances = data.instances.clone();
         let vertices = texel(
             device,
@@ -153,7 +167,7 @@ impl VulkanBackend {
         };
         let input = |at, name, format, data: &[u8]| -> Result<Input> {
             let buffer = texel(device, name, format, data, usage)?;
-            Ok((at, BindingKind::Texel, buffer))
+            Ok((at, array, buffer))
         };
         let float = TexelFormat::Rgba32Float;
         let (word, pair) = (TexelFormat::R32Uint, TexelFormat::Rg32Uint);
@@ -165,7 +179,7 @@ impl VulkanBackend {
                 BindingKind::Uniform,
                 Buffer::from_slice(device, "params", Usage::UNIFORM, &[params])?,
             ),
-            (layout::BIND_VERTICES, BindingKind::Texel, vertices),
+            (layout::BIND_VERTICES, array, vertices),
         ];
         #[rustfmt::skip]
         shared.extend([
@@ -186,48 +200,32 @@ impl VulkanBackend {
             let none = Stream::with_room(&[])?;
             shared.extend(stream::inputs(device, &none, tuning.study, usage)?);
         }
+        let others = [(layout::BIND_FILM, &film), (layout::BIND_LEDGER, &ledger)];
         if by_address {
-            let table = addresses(&shared, &traversal);
-            let buffer = Buffer::from_slice(device, "addresses", Usage::UNIFORM, &table)?;
-            shared.push((layout::BIND_ADDRESSES, BindingKind::Uniform, buffer));
+            let none = [0u64; layout::ADDRESSES_SIZE as usize];
+            let table = Buffer::from_slice(device, "addresses", Usage::UNIFORM, &none)?;
+            let inputs = shared.iter().map(|(at, _, buffer)| (*at, buffer));
+            note_addresses(&table, inputs.chain(others).chain(traversal.arrays()))?;
+            shared.push((layout::BIND_ADDRESSES, BindingKind::Uniform, table));
         }
-        let storage = BindingKind::Storage;
         let mut bindings: Vec<_> = shared.iter().map(|(at, kind, _)| (*at, *kind)).collect();
-        bindings.extend([(layout::BIND_FILM, storage), (layout::BIND_LEDGER, storage)]);
-        bindings.extend(traversal.bindings());
+        bindings.extend(others.map(|(at, _)| (at, storage)));
+        bindings.extend(traversal.bindings(by_address));
         let compile = |spec: &Spec| {
             traversal.path_pipeline(device, spec, &bindings, tuning.study, by_address)
         };
         let guided = match spec.guide && tuning.guide {
-            true => photons::guide(
-                device, &traversal, &spec, &shared, data, by_address, compile,
-            )?,
+            true => photons::guide(device, &traversal, &spec, &shared, data, compile)?,
             false => None,
         };
         spec.guide = guided.is_some();
         let pipeline = if let Some((guide, pipeline)) = guided {
             let guide = input(layout::BIND_GUIDE, "guide", RECORDS, cast_slice(&guide))?;
-            replace(&mut shared, &traversal, [guide])?;
+            replace(&mut shared, [guide])?;
             pipeline
         } else {
             compile(&spec)?
         };
-
-        let film = Buffer::new(
-            device,
-            "film",
-            film_bytes,
-            Usage::STORAGE,
-            gpu::Memory::DeviceLocal,
-        )?;
-        let ledger = Buffer::new(
-            device,
-            "ledger",
-            u64::from(layout::LEDGER_SIZE) * 4,
-            Usage::STORAGE,
-            gpu::Memory::DeviceLocal,
-        )?;
-        let others = [(layout::BIND_FILM, &film), (layout::BIND_LEDGER, &ledger)];
         let set = bind(&pipeline, "path", &shared, &others, &traversal)?;
         memory.acceleration = traversal.bytes();
         Ok(Self {
@@ -253,23 +251,32 @@ impl VulkanBackend {
     }
 }
 
-fn find(shared: &[Input], binding: u32) -> Option<&Buffer> {
+pub(super) fn find(shared: &[Input], binding: u32) -> Option<&Buffer> {
     let input = shared.iter().find(|(at, _, _)| *at == binding);
     input.map(|(_, _, buffer)| buffer)
 }
 
 /// Puts others in the place of some inputs.
-fn replace<const N: usize>(
-    shared: &mut Vec<Input>,
-    traversal: &Traversal,
-    inputs: [Input; N],
-) -> Result<()> {
+fn replace<const N: usize>(shared: &mut Vec<Input>, inputs: [Input; N]) -> Result<()> {
     shared.retain(|(at, ..)| inputs.iter().all(|input| input.0 != *at));
-    shared.extend(inputs);
-    match find(shared, layout::BIND_ADDRESSES) {
-        Some(table) => table.write(0, &addresses(shared, traversal)),
-        None => Ok(()),
+    if let Some(table) = find(shared, layout::BIND_ADDRESSES) {
+        note_addresses(table, inputs.iter().map(|(at, _, buffer)| (*at, buffer)))?;
     }
+    shared.extend(inputs);
+    Ok(())
+}
+
+/// Tells kernels where they find buffers, by their bindings.
+pub(super) fn note_addresses<'a>(
+    table: &Buffer,
+    buffers: impl Iterator<Item = (u32, &'a Buffer)>,
+) -> Result<()> {
+    for (at, buffer) in buffers {
+        if let Some(address) = buffer.shader_address() {
+            table.write(8 * u64::from(at), &[address])?;
+        }
+    }
+    Ok(())
 }
 
 impl Backend for VulkanBackend {
@@ -350,7 +357,7 @@ impl Backend for VulkanBackend {
             None => Usage::default(),
         };
         let inputs = stream::inputs(&self.device, stream, self.study, usage)?;
-        replace(&mut self.shared, &self.traversal, inputs)?;
+        replace(&mut self.shared, inputs)?;
         let others = [
             (layout::BIND_FILM, &self.film),
             (layout::BIND_LEDGER, &self.ledger),
@@ -380,18 +387,22 @@ impl Backend for VulkanBackend {
         let mut bindings: Vec<_> = self
             .shared
             .iter()
-            .map(|(at, kind, _)| (*at, *kind))
+            .map(|(at, kind, _)| match kind {
+                // the kernel has no edition that reads by addresses
+                BindingKind::Address => (*at, BindingKind::Texel),
+                _ => (*at, *kind),
+            })
             .collect();
         bindings.extend([
             (layout::BIND_PROBE_RAYS, storage),
             (layout::BIND_PROBE_HITS, storage),
         ]);
-        bindings.extend(self.traversal.bindings());
+        bindings.extend(self.traversal.bindings(false));
         let traversal = &self.traversal;
         let pipeline = traversal.probe_pipeline(&self.device, &self.spec, &bindings)?;
         let mut hits = Vec::with_capacity(rays.len());
         for some in rays.chunks(PROBE_RAYS) {
-            let input = upload(&self.device, "probe rays", some)?;
+            let input = upload(&self.device, "probe rays", some, Usage::STORAGE)?;
             let output = Buffer::new(
                 &self.device,
                 "probe hits",
@@ -418,19 +429,6 @@ impl Backend for VulkanBackend {
     }
 }
 
-/// The addresses of texel buffers, by their bindings.
-fn addresses(shared: &[Input], traversal: &Traversal) -> [u64; layout::ADDRESSES_SIZE as usize] {
-    let mut addresses = [0u64; layout::ADDRESSES_SIZE as usize];
-    let inputs = shared
-        .iter()
-        .filter(|(_, kind, _)| *kind == BindingKind::Texel);
-    let inputs = inputs.map(|(at, _, buffer)| (*at, buffer));
-    for (at, buffer) in inputs.chain(traversal.texel_buffers()) {
-        addresses[at as usize] = buffer.shader_address().unwrap_or(0);
-    }
-    addresses
-}
-
 /// What a kernel reads and writes.
 pub(super) fn bind(
     pipeline: &Pipeline,
@@ -450,6 +448,7 @@ pub(super) fn upload<T: bytemuck::Pod>(
     device: &Arc<Device>,
     name: &str,
     data: &[T],
+    usage: Usage,
 ) -> Result<Buffer> {
     let bytes = size_of_val(data) as u64;
     if bytes > device.caps().max_storage_range {
@@ -461,7 +460,7 @@ pub(super) fn upload<T: bytemuck::Pod>(
             ),
         });
     }
-    Buffer::from_slice(device, name, Usage::STORAGE, data)
+    Buffer::from_slice(device, name, usage, data)
 }
 
 /// Whether pixels can share: those of a block are lanes of a subgroup.

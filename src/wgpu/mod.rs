@@ -3,7 +3,7 @@
 //!
 //! Nothing runs past the call that started it, as in [`crate::gpu`].
 
-mod freeze;
+mod bindings;
 mod structures;
 
 use std::future::Future;
@@ -16,6 +16,7 @@ use wgpu::util::DeviceExt;
 use crate::error::{Error, Result};
 use crate::gpu::passthrough;
 use crate::settings::BackendChoice;
+use crate::spirv;
 
 /// Every binding has at least so many bytes: wgpu takes no empty ones, and none smaller than an element.
 const LEAST_BYTES: usize = 256;
@@ -163,7 +164,9 @@ impl Device {
         let numbers: Vec<_> = resources
             .map(|(at, resource)| (*at, is_read_only(resource)))
             .collect();
-        let words = freeze::freeze(desc.spirv, desc.constants, &numbers);
+        // wgpu gives no values to constants of a module that passes by, and naga knows no OpSpecConstantOp
+        let words = spirv::specialised(desc.spirv, desc.constants);
+        let words = bindings::numbered(&words, &numbers);
         let module = self.watch("kernel", || match desc.way {
             BackendChoice::WgpuSpirv | BackendChoice::WgpuRayQuery => {
                 passthrough::passed(&self.raw, &words, (desc.group_size, 1, 1))

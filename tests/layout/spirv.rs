@@ -16,6 +16,7 @@ const OP_LOAD: u32 = 61;
 const OP_ACCESS_CHAIN: u32 = 65;
 const OP_DECORATE: u32 = 71;
 const OP_MEMBER_DECORATE: u32 = 72;
+const OP_LABEL: u32 = 248;
 
 const SPEC_ID: u32 = 1;
 const ARRAY_STRIDE: u32 = 6;
@@ -145,6 +146,11 @@ impl Module {
         self.all(OP_EXT_INST)
             .filter(|o| o[3] == instruction)
             .count()
+    }
+
+    /// Basic blocks.
+    pub fn blocks(&self) -> usize {
+        self.0.iter().filter(|(op, _)| *op == OP_LABEL).count()
     }
 
     /// Instructions from the first function on.
