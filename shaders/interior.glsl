@@ -59,15 +59,32 @@ float interior_eta(Boundary b)
     return before == IOR_INFINITE || after == IOR_INFINITE ? IOR_INFINITE : after / before;
 }
 
+// The solid at a place. Indices are constants here and below, so that arrays are registers: a driver may search its way
+// to an index that is not, by branches at each use.
+uvec2 interior_at(Interior i, uint place)
+{
+    uvec2 solid = i.entered[0];
+    for (uint k = 1u; k < INTERIOR_SIZE; k++) {
+        solid = k == place ? i.entered[k] : solid;
+    }
+    return solid;
+}
+
+void interior_put(inout Interior i, uint place, uvec2 solid)
+{
+    for (uint k = 0u; k < INTERIOR_SIZE; k++) {
+        i.entered[k] = k == place ? solid : i.entered[k];
+    }
+}
+
 // Place of a solid among those that hold the point, or their number.
 uint interior_slot(Interior i, uvec2 solid)
 {
-    for (uint k = 0u; k < i.count; k++) {
-        if (i.entered[k] == solid) {
-            return k;
-        }
+    uint slot = i.count;
+    for (uint k = 0u; k < INTERIOR_SIZE; k++) {
+        slot = k < i.count && i.entered[k] == solid ? k : slot;
     }
-    return i.count;
+    return slot;
 }
 
 // Material of the highest rank among the solids.
@@ -76,10 +93,11 @@ uint interior_highest(Interior i)
     uint rank = 0u;
     uint highest = NONE;
     for (uint k = 0u; k < i.count; k++) {
-        uint other = scene_medium(i.entered[k].x).rank;
+        uint material = interior_at(i, k).x;
+        uint other = scene_medium(material).rank;
         if (other > rank) {
             rank = other;
-            highest = i.entered[k].x;
+            highest = material;
         }
     }
     return highest;
@@ -95,9 +113,9 @@ Interior interior_cross(Interior i, uvec2 solid, bool is_entered)
     }
     if (!is_entered) {
         i.count--;
-        i.entered[slot] = i.entered[i.count];
+        interior_put(i, slot, interior_at(i, i.count));
     } else if (i.count < INTERIOR_SIZE) {
-        i.entered[i.count] = solid;
+        interior_put(i, i.count, solid);
         i.count++;
     } else {
         interior_overflows++;
@@ -141,7 +159,7 @@ bool interior_find(SurfacePoint s, vec3 d, inout bool fits, inout uint rays)
 bool interior_ask(vec3 origin, vec3 d, inout uint rays)
 {
     surface_skip.is_closed = true;
-    for (uint k = 0u; k < surface_skip.count; k++) {
+    for (uint k = 0u; k < SKIP_SIZE; k++) {
         surface_skip.solids[k].x &= ~SKIP_FLAGS;
     }
     float t_min = 0.0;
@@ -179,7 +197,7 @@ Boundary interior_boundary(Interior here, Hit hit, SurfacePoint s, vec3 d, inout
     b.before = here.current;
     surface_skip.is_search = true;
     surface_skip.count = here.count;
-    for (uint k = 0u; k < here.count; k++) {
+    for (uint k = 0u; k < INTERIOR_SIZE; k++) {
         surface_skip.solids[k] = uvec2(here.entered[k].x | SKIP_HOLDS, here.entered[k].y);
     }
     bool fits = surface_skip_settle(uvec2(s.material, hit.instance), s.is_front);
@@ -188,9 +206,9 @@ Boundary interior_boundary(Interior here, Hit hit, SurfacePoint s, vec3 d, inout
     }
     b.beyond.count = 0u;
     for (uint k = 0u; k < surface_skip.count; k++) {
-        uvec2 solid = surface_skip.solids[k];
+        uvec2 solid = surface_skip_at(k);
         if ((solid.x & SKIP_HOLDS) != 0u && b.beyond.count < INTERIOR_SIZE) {
-            b.beyond.entered[b.beyond.count] = uvec2(solid.x & ~SKIP_FLAGS, solid.y);
+            interior_put(b.beyond, b.beyond.count, uvec2(solid.x & ~SKIP_FLAGS, solid.y));
             b.beyond.count++;
         } else {
             fits = fits && (solid.x & SKIP_HOLDS) == 0u;

@@ -28,12 +28,23 @@ void surface_skip_triangle(uvec2 triangle)
     surface_skip.triangle = triangle;
 }
 
+// The solid at a place; indices are constants (interior_at).
+uvec2 surface_skip_at(uint place)
+{
+    uvec2 solid = surface_skip.solids[0];
+    for (uint k = 1u; k < SKIP_SIZE; k++) {
+        solid = k == place ? surface_skip.solids[k] : solid;
+    }
+    return solid;
+}
+
 // Place of a solid, or `count`.
 uint surface_skip_slot(uvec2 solid)
 {
     uint slot = surface_skip.count;
-    for (uint k = 0u; k < surface_skip.count; k++) {
-        slot = uvec2(surface_skip.solids[k].x & ~SKIP_FLAGS, surface_skip.solids[k].y) == solid ? k : slot;
+    for (uint k = 0u; k < SKIP_SIZE; k++) {
+        bool is_it = uvec2(surface_skip.solids[k].x & ~SKIP_FLAGS, surface_skip.solids[k].y) == solid;
+        slot = k < surface_skip.count && is_it ? k : slot;
     }
     return slot;
 }
@@ -45,7 +56,10 @@ bool surface_skip_settle(uvec2 solid, bool holds)
     if (slot == SKIP_SIZE) {
         return false;
     }
-    surface_skip.solids[slot] = uvec2(solid.x | SKIP_SETTLED | (holds ? SKIP_HOLDS : 0u), solid.y);
+    uvec2 settled = uvec2(solid.x | SKIP_SETTLED | (holds ? SKIP_HOLDS : 0u), solid.y);
+    for (uint k = 0u; k < SKIP_SIZE; k++) {
+        surface_skip.solids[k] = k == slot ? settled : surface_skip.solids[k];
+    }
     surface_skip.count = max(surface_skip.count, slot + 1u);
     return true;
 }
@@ -54,7 +68,7 @@ bool surface_skip_settle(uvec2 solid, bool holds)
 bool surface_skip_asks(uvec2 solid)
 {
     uint slot = surface_skip_slot(solid);
-    return slot < surface_skip.count ? (surface_skip.solids[slot].x & SKIP_SETTLED) == 0u : !surface_skip.is_closed;
+    return slot < surface_skip.count ? (surface_skip_at(slot).x & SKIP_SETTLED) == 0u : !surface_skip.is_closed;
 }
 
 #endif
