@@ -38,6 +38,7 @@ impl Block<'_> {
     }
 }
 
+/// A function as a graph of blocks.
 pub struct Function<'a> {
     /// Before the first block.
     start: &'a [&'a Words],
@@ -146,11 +147,10 @@ impl<'a> Function<'a> {
             only: vec![None; self.blocks.len()],
         };
         let order = self.order();
-        let instructions = self.blocks.iter().flat_map(|block| block.instructions);
-        for words in
-            instructions.filter(|words| opcode(words) == op::PHI || is_folded(opcode(words)))
-        {
-            known.values[words[2] as usize] = Value::Open;
+        for words in self.blocks.iter().flat_map(|block| block.instructions) {
+            if opcode(words) == op::PHI || is_folded(opcode(words)) {
+                known.values[words[2] as usize] = Value::Open;
+            }
         }
         loop {
             let mut is_new = false;
@@ -201,7 +201,7 @@ impl<'a> Function<'a> {
     }
 
     /// Writes what is reached, and stubs where constructs that are left end in what is not.
-    pub fn emit(&self, reach: &Reach, body: &mut Body) -> Option<()> {
+    pub fn emit(&self, reach: &Reach, body: &mut Body) {
         let is_reached = |at: usize| at == 0 || !reach.from[at].is_empty();
         // labels of merge blocks and, with the starts of their loops, of continue targets
         let mut ends = HashSet::new();
@@ -253,7 +253,6 @@ impl<'a> Function<'a> {
             body.keep(&stub);
         }
         body.keep(self.end);
-        Some(())
     }
 }
 

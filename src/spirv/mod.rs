@@ -93,17 +93,14 @@ fn module(spirv: &[u32], constants: &[(u32, u32)]) -> Option<Vec<u32>> {
         let end = rest.iter().position(is_end)? + 1;
         let function = Function::new(&rest[..end], bound)?;
         let reach = function.reach(&mut known);
-        function.emit(&reach, &mut body)?;
+        function.emit(&reach, &mut body);
         rest = &rest[end..];
     }
     // decorations and names of what is gone go as well
     let is_about = |words: &Words| [op::DECORATE, op::NAME].contains(&opcode(words));
-    for words in head.iter().filter(|words| !is_about(words)) {
-        words
-            .iter()
-            .skip(1)
-            .take(2)
-            .for_each(|id| body.note(*id, Left::Kept));
+    let declared = head.iter().filter(|words| !is_about(words));
+    for id in declared.flat_map(|words| words.iter().skip(1).take(2)) {
+        body.note(*id, Left::Kept);
     }
     let mut module = Vec::with_capacity(spirv.len());
     module.extend_from_slice(&spirv[..HEADER_WORDS]);
@@ -156,7 +153,7 @@ impl Value {
         }
     }
 
-    /// And, for 0, or or, for 1, of booleans: one of `decisive` decides.
+    /// Conjunction of booleans, where 0 is decisive, or disjunction, where 1 is.
     fn unless(self, other: Self, decisive: u32) -> Self {
         match (self, other) {
             (Self::Is(value), _) | (_, Self::Is(value)) if value == decisive => Self::Is(value),
