@@ -120,6 +120,7 @@ void main()
     if (batch.sample_count == 0u) {
         return;
     }
+    scene_start();
     trace_start();
     FilmNode levels[FILM_LEVELS];
     KernelLane lane = KernelLane(0u, uvec2(0u), 0u, batch.sample_count, batch.sample_count, true, false, 0u, 0u, 0u, 0u);

@@ -37,6 +37,7 @@ void main()
     if (i >= batch.sample_count) {
         return;
     }
+    scene_start();
     trace_start();
     photon = Photon(vec3(0.0), 0.0, vec3(0.0), 0.0);
     photon_is_bent = false;

@@ -40,6 +40,7 @@ void main()
     if (batch.sample_count == 0u) {
         return;
     }
+    scene_start();
     trace_start();
     uint rays = 0u;
     uint different = 0u;

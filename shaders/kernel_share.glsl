@@ -27,6 +27,7 @@ void main()
     if (batch.sample_count == 0u) {
         return;
     }
+    scene_start();
     trace_start();
     FilmNode levels[FILM_LEVELS];
     uint rays = 0u;

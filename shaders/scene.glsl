@@ -7,7 +7,24 @@
 #include "layout.glsl"
 #include "spec.glsl"
 
+#ifdef ADDRESSES
+// For as long as the invocation runs: lavapipe makes a branch for each word that is read of a uniform buffer.
+Params params;
+uint64_t addresses[ADDRESSES_SIZE];
+layout(binding = BIND_ADDRESSES, scalar) uniform AddressesBlock { uint64_t addresses_given[ADDRESSES_SIZE]; };
+layout(buffer_reference, scalar, buffer_reference_align = 16) readonly buffer ParamsAt { Params params; };
+// First of all in every kernel.
+void scene_start()
+{
+    for (uint i = 0u; i < ADDRESSES_SIZE; i++) {
+        addresses[i] = addresses_given[i];
+    }
+    params = ParamsAt(addresses[BIND_PARAMS]).params;
+}
+#else
 layout(binding = BIND_PARAMS, scalar) uniform ParamsBlock { Params params; };
+void scene_start() {}
+#endif
 
 // wgpu has no texel buffers; the same records then are storage buffers. CPUs that gather read
 // by addresses, in words of 64 bits (docs/decisions.md).
@@ -25,7 +42,6 @@ layout(binding = BIND_ENV_MAP, scalar) readonly buffer EnvMapBlock { vec4 env_ma
 layout(binding = BIND_ENV_TABLE, scalar) readonly buffer EnvTableBlock { uvec2 env_table[]; };
 layout(binding = BIND_MEDIA, scalar) readonly buffer MediaBlock { uvec4 media[]; };
 #elif defined(ADDRESSES)
-layout(binding = BIND_ADDRESSES, scalar) uniform AddressesBlock { uint64_t addresses[ADDRESSES_SIZE]; };
 layout(buffer_reference, scalar, buffer_reference_align = 16) readonly buffer Quad { u64vec2 words; };
 layout(buffer_reference, scalar, buffer_reference_align = 8) readonly buffer Pair { uint64_t words; };
 layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer Single { uint word; };

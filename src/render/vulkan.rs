@@ -177,7 +177,7 @@ impl VulkanBackend {
             (
                 layout::BIND_PARAMS,
                 BindingKind::Uniform,
-                Buffer::from_slice(device, "params", Usage::UNIFORM, &[params])?,
+                Buffer::from_slice(device, "params", Usage::UNIFORM | usage, &[params])?,
             ),
             (layout::BIND_VERTICES, array, vertices),
         ];
