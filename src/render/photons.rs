@@ -10,7 +10,7 @@ use glam::DVec3;
 
 use super::traversal::{GROUP, Traversal};
 use super::upload::SceneData;
-use super::vulkan::{Input, bind, find, note_addresses, upload};
+use super::vulkan::{Input, bind, find, note_address, upload};
 use crate::error::Result;
 use crate::gpu::{BindingKind, Buffer, Device, Memory, Pipeline, Usage};
 use crate::guide;
@@ -86,8 +86,8 @@ fn trace(
         (layout::BIND_PHOTON_STARTS, &input),
         (layout::BIND_PHOTONS, &output),
     ];
-    if let Some(table) = table {
-        note_addresses(table, others.into_iter())?;
+    for (at, buffer) in others {
+        note_address(shared, at, buffer)?;
     }
     let set = bind(&pipeline, "photons", shared, &others, traversal)?;
     let push = layout::Batch {

@@ -202,10 +202,12 @@ impl VulkanBackend {
         }
         let others = [(layout::BIND_FILM, &film), (layout::BIND_LEDGER, &ledger)];
         if by_address {
-            let none = [0u64; layout::ADDRESSES_SIZE as usize];
-            let table = Buffer::from_slice(device, "addresses", Usage::UNIFORM, &none)?;
+            let mut all = [0u64; layout::ADDRESSES_SIZE as usize];
             let inputs = shared.iter().map(|(at, _, buffer)| (*at, buffer));
-            note_addresses(&table, inputs.chain(others).chain(traversal.arrays()))?;
+            for (at, buffer) in inputs.chain(others).chain(traversal.arrays()) {
+                all[at as usize] = buffer.shader_address().unwrap_or(0);
+            }
+            let table = Buffer::from_slice(device, "addresses", Usage::UNIFORM, &all)?;
             shared.push((layout::BIND_ADDRESSES, BindingKind::Uniform, table));
         }
         let mut bindings: Vec<_> = shared.iter().map(|(at, kind, _)| (*at, *kind)).collect();
@@ -259,24 +261,22 @@ pub(super) fn find(shared: &[Input], binding: u32) -> Option<&Buffer> {
 /// Puts others in the place of some inputs.
 fn replace<const N: usize>(shared: &mut Vec<Input>, inputs: [Input; N]) -> Result<()> {
     shared.retain(|(at, ..)| inputs.iter().all(|input| input.0 != *at));
-    if let Some(table) = find(shared, layout::BIND_ADDRESSES) {
-        note_addresses(table, inputs.iter().map(|(at, _, buffer)| (*at, buffer)))?;
+    for (at, _, buffer) in &inputs {
+        note_address(shared, *at, buffer)?;
     }
     shared.extend(inputs);
     Ok(())
 }
 
-/// Tells kernels where they find buffers, by their bindings.
-pub(super) fn note_addresses<'a>(
-    table: &Buffer,
-    buffers: impl Iterator<Item = (u32, &'a Buffer)>,
-) -> Result<()> {
-    for (at, buffer) in buffers {
-        if let Some(address) = buffer.shader_address() {
-            table.write(8 * u64::from(at), &[address])?;
-        }
+/// Tells kernels that read by addresses where they find a buffer.
+pub(super) fn note_address(shared: &[Input], at: u32, buffer: &Buffer) -> Result<()> {
+    match (
+        find(shared, layout::BIND_ADDRESSES),
+        buffer.shader_address(),
+    ) {
+        (Some(table), Some(address)) => table.write(8 * u64::from(at), &[address]),
+        _ => Ok(()),
     }
-    Ok(())
 }
 
 impl Backend for VulkanBackend {
