@@ -1,8 +1,8 @@
 //! SPIR-V modules without what their constants rule out. Drivers read a whole module before they know what is never taken, at
 //! every start; so constants get their values here, and blocks that no path reaches are left out: conditional constant
-//! propagation [Wegman91]. What is not known here stays as it is.
+//! propagation \[Wegman91\]. What is not known here stays as it is.
 //!
-//! [Wegman91] Wegman, Zadeck, Constant Propagation with Conditional Branches.
+//! \[Wegman91\] Wegman, Zadeck, Constant Propagation with Conditional Branches.
 
 mod blocks;
 
