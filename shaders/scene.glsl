@@ -13,7 +13,7 @@ Params params;
 uint64_t addresses[ADDRESSES_SIZE];
 layout(binding = BIND_ADDRESSES, scalar) uniform AddressesBlock { uint64_t addresses_given[ADDRESSES_SIZE]; };
 layout(buffer_reference, scalar, buffer_reference_align = 16) readonly buffer ParamsAt { Params params; };
-// First of all in every kernel.
+// Once in each kernel, before the scene is read.
 void scene_start()
 {
     for (uint i = 0u; i < ADDRESSES_SIZE; i++) {

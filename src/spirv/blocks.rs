@@ -2,7 +2,7 @@
 
 use std::collections::{HashMap, HashSet};
 
-use super::{Known, Value, Words, instruction, is_folded, op, opcode};
+use super::{Known, Value, Words, instruction, op, opcode};
 
 /// The place of a number that is no label.
 const NOWHERE: usize = usize::MAX;
@@ -148,7 +148,7 @@ impl<'a> Function<'a> {
         };
         let order = self.order();
         for words in self.blocks.iter().flat_map(|block| block.instructions) {
-            if opcode(words) == op::PHI || is_folded(opcode(words)) {
+            if known.compute(words, &[]).is_some() {
                 known.values[words[2] as usize] = Value::Open;
             }
         }
@@ -171,10 +171,8 @@ impl<'a> Function<'a> {
         }
         let mut is_new = false;
         for words in block.instructions {
-            let value = match opcode(words) {
-                op::PHI => known.meet(&words[3..], &reach.from[at]),
-                what if is_folded(what) => known.fold(what, &words[3..]),
-                _ => continue,
+            let Some(value) = known.compute(words, &reach.from[at]) else {
+                continue;
             };
             let before = std::mem::replace(&mut known.values[words[2] as usize], value);
             is_new |= before != value;

@@ -138,18 +138,11 @@ enum Value {
 }
 
 impl Value {
-    fn map(self, function: impl Fn(u32) -> Option<u32>) -> Self {
-        match self {
-            Self::Is(value) => function(value).map_or(Self::Varies, Self::Is),
-            other => other,
-        }
-    }
-
-    fn with(self, other: Self, function: impl Fn(u32, u32) -> Option<u32>) -> Self {
+    fn with(self, other: Self, function: impl Fn(u32, u32) -> u32) -> Self {
         match (self, other) {
-            (Self::Is(a), b) => b.map(|b| function(a, b)),
+            (Self::Is(a), Self::Is(b)) => Self::Is(function(a, b)),
             (Self::Varies, _) | (_, Self::Varies) => Self::Varies,
-            (Self::Open, _) => Self::Open,
+            _ => Self::Open,
         }
     }
 
@@ -162,26 +155,6 @@ impl Value {
             (Self::Varies, Self::Varies) => Self::Varies,
         }
     }
-}
-
-/// Whether results of an operation may be known.
-fn is_folded(what: u32) -> bool {
-    matches!(
-        what,
-        op::LOGICAL_AND
-            | op::LOGICAL_OR
-            | op::LOGICAL_NOT
-            | op::LOGICAL_EQUAL
-            | op::LOGICAL_NOT_EQUAL
-            | op::I_EQUAL
-            | op::I_NOT_EQUAL
-            | op::SELECT
-            | op::BITWISE_AND
-            | op::BITWISE_OR
-            | op::I_ADD
-            | op::SHIFT_LEFT_LOGICAL
-            | op::SHIFT_RIGHT_LOGICAL
-    )
 }
 
 /// What is known of a module's results.
@@ -230,7 +203,7 @@ impl Known {
                     continue;
                 }
                 (op::SPEC_CONSTANT_OP, [_, ty, id, what, operands @ ..]) => {
-                    if let Value::Is(value) = self.fold(*what, operands) {
+                    if let Some(Value::Is(value)) = self.fold(*what, operands) {
                         fixed.push(self.constant(*ty, *id, value));
                         continue;
                     }
@@ -263,27 +236,37 @@ impl Known {
             .unwrap_or(Value::Varies)
     }
 
-    /// What an operation gives; `Varies` for those that [`is_folded`] does not name.
-    fn fold(&self, what: u32, operands: &[u32]) -> Value {
+    /// What an operation gives; `None` of those that are not computed here.
+    fn fold(&self, what: u32, operands: &[u32]) -> Option<Value> {
         let operand = |at: usize| operands.get(at).map_or(Value::Varies, |id| self.get(*id));
         let (a, b) = (operand(0), operand(1));
-        match what {
+        Some(match what {
             op::LOGICAL_AND => a.unless(b, 0),
             op::LOGICAL_OR => a.unless(b, 1),
-            op::LOGICAL_NOT => a.map(|a| Some(u32::from(a == 0))),
-            op::LOGICAL_EQUAL | op::I_EQUAL => a.with(b, |a, b| Some(u32::from(a == b))),
-            op::LOGICAL_NOT_EQUAL | op::I_NOT_EQUAL => a.with(b, |a, b| Some(u32::from(a != b))),
+            op::LOGICAL_NOT => a.with(Value::Is(0), |a, _| u32::from(a == 0)),
+            op::LOGICAL_EQUAL | op::I_EQUAL => a.with(b, |a, b| u32::from(a == b)),
+            op::LOGICAL_NOT_EQUAL | op::I_NOT_EQUAL => a.with(b, |a, b| u32::from(a != b)),
             op::SELECT => match a {
                 Value::Is(0) => operand(2),
                 Value::Is(_) => b,
                 other => other,
             },
-            op::BITWISE_AND => a.with(b, |a, b| Some(a & b)),
-            op::BITWISE_OR => a.with(b, |a, b| Some(a | b)),
-            op::I_ADD => a.with(b, |a, b| Some(a.wrapping_add(b))),
-            op::SHIFT_LEFT_LOGICAL => a.with(b, u32::checked_shl),
-            op::SHIFT_RIGHT_LOGICAL => a.with(b, u32::checked_shr),
-            _ => Value::Varies,
+            op::BITWISE_AND => a.with(b, |a, b| a & b),
+            op::BITWISE_OR => a.with(b, |a, b| a | b),
+            op::I_ADD => a.with(b, u32::wrapping_add),
+            // shifts by 32 and more are undefined
+            op::SHIFT_LEFT_LOGICAL => a.with(b, u32::wrapping_shl),
+            op::SHIFT_RIGHT_LOGICAL => a.with(b, u32::wrapping_shr),
+            _ => return None,
+        })
+    }
+
+    /// What an instruction of a block gives that these lead to; `None` of those that are not computed here.
+    fn compute(&self, words: &Words, from: &[u32]) -> Option<Value> {
+        let operands = words.get(3..)?;
+        match opcode(words) {
+            op::PHI => Some(self.meet(operands, from)),
+            what => self.fold(what, operands),
         }
     }
 
