@@ -65,7 +65,7 @@ vec3 bsdf_diffuse(Bsdf b, float cos_o, float cos_i)
     if (!HAS_SPECULAR) {
         return b.diffuse * INV_PI;
     }
-    float base = max(1.0 - b.coat_f0, 1.0e-6);
+    float base = larger(1.0 - b.coat_f0, 1.0e-6);
     return b.diffuse * (INV_PI * bsdf_coat_transmission(b, cos_o) * bsdf_coat_transmission(b, cos_i) / base);
 }
 
@@ -85,7 +85,7 @@ Bsdf bsdf_of(SurfacePoint s, float cos_o, float eta)
         b.alpha = alpha < GGX_MIN_ALPHA ? 0.0 : alpha;
         if (HAS_DIELECTRIC) {
             b.glass = s.transmission;
-            metallic = b.glass < 1.0 ? min(metallic / (1.0 - b.glass), 1.0) : 0.0;
+            metallic = b.glass < 1.0 ? smaller(metallic / (1.0 - b.glass), 1.0) : 0.0;
             // A dielectric loses little; what the rest reflects is at most its share.
             b.p_glass = b.glass;
             bool is_bent = !s.is_solid || abs(eta - 1.0) >= ETA_MATCHED || eta == IOR_INFINITE;

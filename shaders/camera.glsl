@@ -16,7 +16,7 @@ struct Ray {
 Ray camera_sphere_ray(vec3 centre, float radius, vec4 u)
 {
     float z = 1.0 - 2.0 * u.x;
-    float sine = sqrt(max(1.0 - z * z, 0.0));
+    float sine = sqrt(larger(1.0 - z * z, 0.0));
     float phi = TWO_PI * u.y;
     vec3 out_of = vec3(sine * cos(phi), sine * sin(phi), z);
     float r = radius * sqrt(u.z);

@@ -78,8 +78,8 @@ DielectricSplit dielectric_split(Dielectric d, float c)
         f.t *= sum;
     }
     // What a strength below 1 does not reflect is transmitted; nothing weakens total reflection.
-    split.r = f.t > 0.0 ? min(f.r * d.strength, vec3(1.0)) : vec3(1.0);
-    split.t = f.t > 0.0 ? d.tint * max(f.t + f.r * (1.0 - d.strength), vec3(0.0)) : vec3(0.0);
+    split.r = f.t > 0.0 ? smaller(f.r * d.strength, vec3(1.0)) : vec3(1.0);
+    split.t = f.t > 0.0 ? d.tint * larger(f.t + f.r * (1.0 - d.strength), vec3(0.0)) : vec3(0.0);
     float sum_r = split.r.x + split.r.y + split.r.z;
     split.p_reflect = sum_r / (sum_r + split.t.x + split.t.y + split.t.z);
     return split;

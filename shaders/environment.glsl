@@ -32,7 +32,7 @@ vec2 environment_uv(vec3 d)
 vec4 environment_texel(int x, int y)
 {
     int width = int(params.env_width);
-    x = x < 0 ? x + width : (x >= width ? x - width : x);
+    x = clamp(x < 0 ? x + width : (x >= width ? x - width : x), 0, width - 1);
     y = clamp(y, 0, int(params.env_height) - 1);
     return texelFetch(env_map, y * width + x);
 }
@@ -42,8 +42,9 @@ vec4 environment_lookup(vec2 uv)
     vec2 at = uv * vec2(params.env_width, params.env_height) - 0.5;
     vec2 base = floor(at);
     vec2 f = at - base;
-    int x = int(base.x);
-    int y = int(base.y);
+    // -1 at least
+    int x = whole(base.x + 1.0) - 1;
+    int y = whole(base.y + 1.0) - 1;
     vec4 top = mix(environment_texel(x, y), environment_texel(x + 1, y), f.x);
     vec4 bottom = mix(environment_texel(x, y + 1), environment_texel(x + 1, y + 1), f.x);
     return mix(top, bottom, f.y);

@@ -64,8 +64,8 @@ Guide guide_at(vec3 position, vec3 normal)
             vec4 place = uintBitsToFloat(guide_texel(leaf.x + 2u + 2u * k));
             float weight = uintBitsToFloat(guide_texel(leaf.x + 3u + 2u * k).x);
             vec3 to = place.xyz - position;
-            vec3 middle = to * inversesqrt(max(dot(to, to), 1.0e-30));
-            guide.lobes[k] = GuideLobe(middle, weight * max(dot(middle, normal), 0.0), place.w);
+            vec3 middle = to * inversesqrt(larger(dot(to, to), 1.0e-30));
+            guide.lobes[k] = GuideLobe(middle, weight * larger(dot(middle, normal), 0.0), place.w);
             guide.total += guide.lobes[k].weight;
         }
     }
@@ -97,7 +97,7 @@ vec3 guide_direction(Guide guide, vec3 u)
         }
     }
     // 1 − cosine
-    float w = clamp(-log(u.y + (1.0 - u.y) * exp(-2.0 * lobe.kappa)) / lobe.kappa, 0.0, 2.0);
+    float w = limited(-log(u.y + (1.0 - u.y) * exp(-2.0 * lobe.kappa)) / lobe.kappa, 0.0, 2.0);
     float phi = TWO_PI * u.z;
     float r = sqrt(w * (2.0 - w));
     return normalize(frame_from_z(lobe.middle) * vec3(r * cos(phi), r * sin(phi), 1.0 - w));

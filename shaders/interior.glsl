@@ -128,7 +128,7 @@ Interior interior_cross(Interior i, uvec2 solid, bool is_entered)
 // so near that a ray may pass it on another side; `fits` becomes false where there are too many solids.
 bool interior_find(SurfacePoint s, vec3 d, inout bool fits, inout uint rays)
 {
-    float cosine = max(-dot(s.ng, d), 0.01);
+    float cosine = larger(-dot(s.ng, d), 0.01);
     float bound = max_component(s.error);
     float step = bound / cosine;
     float end = (SEARCH_BEFORE + SEARCH_BEYOND) * step;
@@ -145,7 +145,7 @@ bool interior_find(SurfacePoint s, vec3 d, inout bool fits, inout uint rays)
         SurfaceSide side = surface_side(hit, d);
         if (side.is_solid) {
             is_shared = true;
-            edge = min(edge, side.edge);
+            edge = smaller(edge, side.edge);
             fits = surface_skip_settle(uvec2(side.material, hit.instance), side.is_front);
         } else {
             t_min = hit.t;

@@ -23,18 +23,18 @@ uint kernel_exponent(uvec2 at)
     return exponent;
 }
 
-// The path of sample i of the batch at a pixel of the window, which takes 2^exponent times as many as others.
-PathState kernel_start(uint i, uvec2 at, uint exponent)
+// The path of sample i of the batch at a pixel of the window, which takes 2^exponent times as many as others; `base` is that of
+// pixels which take as many as others.
+PathState kernel_start(uint i, uvec2 at, uint exponent, uvec4 base)
 {
     uvec2 pixel = uvec2(params.window_x, params.window_y) + at;
     uint low = batch.first_sample_low;
-    uint high = batch.first_sample_high;
     if (HAS_ALLOTMENT) {
         // no shift by 32, which is undefined
-        high = high << exponent | low >> 1u >> (31u - exponent);
+        base = pixels_base(batch.first_sample_high << exponent | low >> 1u >> (31u - exponent));
         low <<= exponent;
     }
-    return path_start(pixels_key(pixel, low + i, high), pixel);
+    return path_start(pixels_key(base, pixel, low + i), pixel);
 }
 
 // What an invocation has computed of its pixel, and what it is computing.
@@ -53,12 +53,14 @@ struct KernelLane {
 };
 
 // Notes the sample whose path has ended, and starts the next one, of the pixel or of the next pixel.
-void kernel_next(inout KernelLane lane, inout FilmNode levels[FILM_LEVELS], inout PathState path, inout PathResult result)
+void kernel_next(inout KernelLane lane, inout FilmNode levels[FILM_LEVELS], inout PathState path, inout PathResult result, uvec4 base)
 {
     if (lane.i < lane.count) {
         lane.rays += result.rays;
-        lane.truncated += result.truncated > 0.0 ? 1u : 0u;
-        lane.truncated_throughput += uint(result.truncated * 65536.0 + 0.5);
+        if (result.truncated > 0.0) {
+            lane.truncated++;
+            lane.truncated_throughput += uint(result.truncated * 65536.0 + 0.5);
+        }
         bool is_dropped = !is_finite(result.radiance);
         lane.non_finite += is_dropped ? 1u : 0u;
 
@@ -111,7 +113,7 @@ void kernel_next(inout KernelLane lane, inout FilmNode levels[FILM_LEVELS], inou
 #ifdef TRACE_RECORDS
     stream_sample();
 #endif
-    path = kernel_start(lane.i, lane.at, lane.exponent);
+    path = kernel_start(lane.i, lane.at, lane.exponent, base);
     result = path_result();
 }
 
@@ -122,6 +124,7 @@ void main()
     }
     scene_start();
     trace_start();
+    uvec4 base = pixels_base(batch.first_sample_high);
     FilmNode levels[FILM_LEVELS];
     KernelLane lane = KernelLane(0u, uvec2(0u), 0u, batch.sample_count, batch.sample_count, true, false, 0u, 0u, 0u, 0u);
     PathResult result;
@@ -138,7 +141,7 @@ void main()
             }
         }
         if (!path_goes_on(path)) {
-            kernel_next(lane, levels, path, result);
+            kernel_next(lane, levels, path, result, base);
         }
     }
 

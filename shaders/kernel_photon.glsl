@@ -42,7 +42,7 @@ void main()
     photon = Photon(vec3(0.0), 0.0, vec3(0.0), 0.0);
     photon_is_bent = false;
     PhotonStart start = photon_starts[i];
-    uvec4 key = rng_key(uvec2(0u), NONE, i, 0u);
+    uvec4 key = rng_key(rng_base(uvec2(0u), 0u), NONE, i);
     PathResult result = path_result();
     LightSample light;
     // every other one on each side

@@ -29,6 +29,7 @@ void main()
     }
     scene_start();
     trace_start();
+    uvec4 base = pixels_base(batch.first_sample_high);
     FilmNode levels[FILM_LEVELS];
     uint rays = 0u;
     uint non_finite = 0u;
@@ -53,7 +54,7 @@ void main()
             PathResult result = path_result();
             share_start();
             if (is_there) {
-                PathState path = path_start(pixels_key(pixel, batch.first_sample_low + i, batch.first_sample_high), pixel);
+                PathState path = path_start(pixels_key(base, pixel, batch.first_sample_low + i), pixel);
                 while (path_goes_on(path)) {
                     path_step(path, result);
                 }
@@ -63,8 +64,10 @@ void main()
             rays += result.rays;
             bool is_dropped = !is_finite(radiance);
             if (is_kept) {
-                truncated += result.truncated > 0.0 ? 1u : 0u;
-                truncated_throughput += uint(result.truncated * 65536.0 + 0.5);
+                if (result.truncated > 0.0) {
+                    truncated++;
+                    truncated_throughput += uint(result.truncated * 65536.0 + 0.5);
+                }
                 non_finite += is_dropped ? 1u : 0u;
             }
             node = FilmNode(is_dropped ? vec3(0.0) : radiance, vec3(0.0), vec3(0.0), result.first.albedo, result.first.normal,

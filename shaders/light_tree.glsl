@@ -60,13 +60,6 @@ LightCluster light_cluster(uvec4 sphere, uvec4 cone)
     return c;
 }
 
-// Comparisons instead of max, which takes three instructions on lavapipe for the sake of NaN.
-float light_not_negative(float x)
-{
-    precise float y = x > 0.0 ? x : 0.0;
-    return y;
-}
-
 // Cosine and sine of max(a − b, 0) for angles in [0, π].
 vec2 light_angle_beyond(vec2 a, vec2 b)
 {
@@ -76,21 +69,19 @@ vec2 light_angle_beyond(vec2 a, vec2 b)
 // Cosine and sine of an angle in [0, π].
 vec2 light_angle(float cosine)
 {
-    return vec2(cosine, sqrt(light_not_negative(1.0 - cosine * cosine)));
+    return vec2(cosine, sqrt(larger(1.0 - cosine * cosine, 0.0)));
 }
 
 // The largest cosine that an angle can have that is smaller by `reach` at most.
 float light_cosine_bound(vec2 angle, vec2 reach)
 {
-    return light_not_negative(light_angle_beyond(angle, reach).x + CLUSTER_SLACK);
+    return larger(light_angle_beyond(angle, reach).x + CLUSTER_SLACK, 0.0);
 }
 
 // About as much, without a root, for an angle of that cosine and another of that sine; 0 for the same ones.
 float light_horizon_bound(float cosine, float sine)
 {
-    precise float bound = light_not_negative(cosine + sine + CLUSTER_SLACK);
-    bound = bound < 1.0 ? bound : 1.0;
-    return bound;
+    return limited(cosine + sine + CLUSTER_SLACK, 0.0, 1.0);
 }
 
 // The most that a cluster sends to where `cosine` is that of the angle with its axis, as part of its intensity.
@@ -109,9 +100,9 @@ float light_segment_cosine(vec3 axis, vec3 apart, vec3 direction, vec2 x)
     float a = dot(axis, apart);
     float b = dot(axis, direction);
     float c = dot(apart, apart);
-    vec2 at = a > 0.0 ? vec2(clamp(b * c / a, x.x, x.y)) : x;
+    vec2 at = a > 0.0 ? vec2(limited(b * c / a, x.x, x.y)) : x;
     vec2 cosines = (a + b * at) * inversesqrt(c + at * at);
-    return max(cosines.x, cosines.y);
+    return larger(cosines.x, cosines.y);
 }
 
 // In proportion to the most that a cluster can give at a point of a surface. Roots and quotients take most of the time.
@@ -124,7 +115,7 @@ float light_surface_importance(LightCluster c, LightView view)
     float inverse = inversesqrt(nearest2);
     // of the angle at which the sphere is seen
     float sine = c.radius * inverse;
-    vec2 reach = vec2(sqrt(light_not_negative(1.0 - sine * sine)), sine);
+    vec2 reach = vec2(sqrt(larger(1.0 - sine * sine, 0.0)), sine);
     to *= inverse;
     float cosines = light_cone_bound(c, -dot(c.axis, to), reach);
     if (!HAS_DIELECTRIC || view.direction != vec3(0.0)) {
@@ -140,13 +131,13 @@ float light_segment_importance(LightCluster cluster, LightView view)
 {
     vec3 to = cluster.centre - view.origin;
     // lines that pass closer are not told apart
-    float radius2 = max(square(cluster.radius), CLOSE * dot(to, to));
+    float radius2 = larger(square(cluster.radius), CLOSE * dot(to, to));
     float along = dot(to, view.direction);
     vec3 apart = along * view.direction - to;
-    float span = min(view.end, SEGMENT_MOST);
+    float span = smaller(view.end, SEGMENT_MOST);
     vec2 x = vec2(-along, span - along);
     float apart2 = dot(apart, apart);
-    float distance2 = apart2 + square(max(max(x.x, -x.y), 0.0));
+    float distance2 = apart2 + square(larger(larger(x.x, -x.y), 0.0));
     float cosines = 1.0;
     if (distance2 > radius2) {
         float sine2 = radius2 / distance2;
@@ -154,7 +145,7 @@ float light_segment_importance(LightCluster cluster, LightView view)
         cosines = light_cone_bound(cluster, light_segment_cosine(cluster.axis, apart, view.direction, x), reach);
     }
     // ∫ dx / (c + x²) = 2 atan(t) / √c, where t = span √c / (√(c + x₀²) √(c + x₁²) + c + x₀ x₁); 2 t / (1 + 2 t / π) for 2 atan t
-    float c = max(max(apart2, radius2), CLOSEST);
+    float c = larger(larger(apart2, radius2), CLOSEST);
     vec2 ends = sqrt(c + x * x);
     float around = ends.x * ends.y + c + x.x * x.y;
     return cluster.intensity * cosines * span / (around + 2.0 / PI * span * sqrt(c));
@@ -169,9 +160,9 @@ float light_importance(LightCluster c, LightView view)
 // Importance of both children of a node, and their links.
 vec2 light_children(uint node, LightView view, out uvec2 links)
 {
-    int at = int(params.light_nodes + LIGHT_NODE_TEXELS * node);
-    LightCluster left = light_cluster(texelFetch(lights, at), texelFetch(lights, at + 1));
-    LightCluster right = light_cluster(texelFetch(lights, at + 2), texelFetch(lights, at + 3));
+    Row row = row_of(BIND_LIGHTS, params.light_nodes + LIGHT_NODE_TEXELS * node);
+    LightCluster left = light_cluster(row_fetch(lights, row, 0), row_fetch(lights, row, 1));
+    LightCluster right = light_cluster(row_fetch(lights, row, 2), row_fetch(lights, row, 3));
     links = uvec2(left.link, right.link);
     return vec2(light_importance(left, view), light_importance(right, view));
 }
@@ -200,7 +191,7 @@ void light_step(LightView view, inout LightWay way)
     float taken = is_right ? share.y : share.x;
     LightWay next;
     next.link = is_right ? links.y : links.x;
-    next.u = clamp((is_right ? way.u - share.x : way.u) / taken, 0.0, 1.0 - EPSILON);
+    next.u = limited((is_right ? way.u - share.x : way.u) / taken, 0.0, 1.0 - EPSILON);
     next.probability = way.probability * taken;
     if (!(sum > 0.0)) {
         next = LightWay(LIGHT_LEAF, 0.0, 0.0);

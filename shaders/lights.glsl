@@ -70,7 +70,7 @@ LightSample light_sample_triangle(Light light, vec3 from, vec2 u, float choice)
         s.radiance = surface_emission(material, triangle, bary);
         float alpha = surface_base_color(material, triangle, bary).a;
         if (HAS_BLEND && (material.flags & MATERIAL_BLEND) != 0u) {
-            s.radiance *= clamp(alpha, 0.0, 1.0);
+            s.radiance *= limited(alpha, 0.0, 1.0);
         }
         if (HAS_ALPHA && (material.flags & MATERIAL_MASK) != 0u && alpha < material.alpha_cutoff) {
             return s;
@@ -100,8 +100,8 @@ LightSample light_sample_punctual(Light light, vec3 from, float choice)
     s.radiance = light.intensity / distance2;
     if (light.kind == LIGHT_SPOT) {
         // KHR_lights_punctual: the square of a linear ramp in the cosine between the cones.
-        float ramp = (dot(-s.wi, light.direction) - light.cos_outer) / max(light.cos_inner - light.cos_outer, 1.0e-6);
-        s.radiance *= square(clamp(ramp, 0.0, 1.0));
+        float ramp = (dot(-s.wi, light.direction) - light.cos_outer) / larger(light.cos_inner - light.cos_outer, 1.0e-6);
+        s.radiance *= square(limited(ramp, 0.0, 1.0));
     }
     if (!(distance2 > 0.0)) {
         s.pdf = 0.0;
@@ -169,7 +169,7 @@ LightChoice light_pick(LightList list, LightWay way, float u)
         probability = way.probability * params.tree_choice;
     }
     // An empty list reads zeros, which are a light without density.
-    index += min(uint(way.u * float(count)), max(count, 1u) - 1u);
+    index += min(uint(whole(floor(way.u * float(count)))), max(count, 1u) - 1u);
     uvec4 entry = texelFetch(lights, int(LIGHT_TEXELS * index));
     c.light = scene_light(u < uintBitsToFloat(entry.z) ? index : entry.y);
     c.probability = probability;

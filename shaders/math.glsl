@@ -32,9 +32,30 @@ int whole(float x)
     return floatBitsToInt(x + 8388608.0) - 0x4B000000;
 }
 
+// The larger and the smaller number, or b where one is NaN. Of max and min lavapipe makes several instructions, for the sake of
+// NaN and since it halves vectors of 512 bits for them; of these one.
+float larger(float a, float b)
+{
+    precise float c = a > b ? a : b;
+    return c;
+}
+
+float smaller(float a, float b)
+{
+    precise float c = a < b ? a : b;
+    return c;
+}
+
+vec3 larger(vec3 a, vec3 b) { return vec3(larger(a.x, b.x), larger(a.y, b.y), larger(a.z, b.z)); }
+vec3 smaller(vec3 a, vec3 b) { return vec3(smaller(a.x, b.x), smaller(a.y, b.y), smaller(a.z, b.z)); }
+
+// x, or the bound that it is beyond; the lower one where x is NaN.
+float limited(float x, float lower, float upper) { return smaller(larger(x, lower), upper); }
+vec2 limited(vec2 x, float lower, float upper) { return vec2(limited(x.x, lower, upper), limited(x.y, lower, upper)); }
+
 float max_component(vec3 v)
 {
-    return max(v.x, max(v.y, v.z));
+    return larger(v.x, larger(v.y, v.z));
 }
 
 float square(float x)

@@ -28,7 +28,7 @@ vec3 medium_transmittance(Medium m, float distance)
 // Transmittance of each channel relative to that of the clearest: no channel underflows with the others.
 vec3 medium_relative(Medium m, float distance)
 {
-    float least = min(m.sigma_t.x, min(m.sigma_t.y, m.sigma_t.z));
+    float least = smaller(m.sigma_t.x, smaller(m.sigma_t.y, m.sigma_t.z));
     precise vec3 depth = (m.sigma_t - least) * distance;
     return exp(-depth);
 }
@@ -61,7 +61,7 @@ MediumSample medium_sample(Medium m, vec3 beta, float end, vec2 u)
     // u.y is in (0, 1): the distance is positive, and at most 16.6 mean free paths.
     s.distance = sigma > 0.0 ? -log(u.y) / sigma : T_FAR;
     s.is_scattered = s.distance < end;
-    s.distance = min(s.distance, end);
+    s.distance = smaller(s.distance, end);
     vec3 relative = medium_relative(m, s.distance);
     s.weight = s.is_scattered ? m.sigma_s * relative / dot(channels, m.sigma_t * relative)
                               : relative / dot(channels, relative);
@@ -96,16 +96,16 @@ vec3 phase_sample(Medium m, vec3 d, vec2 u)
             float v = 8.0 * (u.x - 0.75) - 1.0;
             cosine = sign(v) * pow(abs(v), 1.0 / 3.0);
         }
-        away = 1.0 - clamp(cosine, -1.0, 1.0);
+        away = 1.0 - limited(cosine, -1.0, 1.0);
     } else {
         // Inverse of Henyey–Greenstein's distribution, solved for 1 − cosθ.
         float g = abs(m.g);
         float root = 1.0 - g + 2.0 * g * u.x;
         float k = (1.0 - g) / root;
-        away = min(k * (1.0 - u.x) * (k * (1.0 + g) + (1.0 - g)), 2.0);
+        away = smaller(k * (1.0 - u.x) * (k * (1.0 + g) + (1.0 - g)), 2.0);
         away = m.g < 0.0 ? 2.0 - away : away;
     }
-    float sine = sqrt(max(away * (2.0 - away), 0.0));
+    float sine = sqrt(larger(away * (2.0 - away), 0.0));
     float phi = TWO_PI * u.y;
     return normalize(frame_from_z(d) * vec3(sine * cos(phi), sine * sin(phi), 1.0 - away));
 }
@@ -139,7 +139,7 @@ float equiangular_pdf(Equiangular e, float distance)
 
 float equiangular_sample(Equiangular e, float end, float u)
 {
-    return clamp(e.closest + e.apart * tan(mix(e.angle_start, e.angle_end, u)), 0.0, end);
+    return limited(e.closest + e.apart * tan(mix(e.angle_start, e.angle_end, u)), 0.0, end);
 }
 
 #endif

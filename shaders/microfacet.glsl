@@ -47,7 +47,7 @@ vec3 ggx_sample_normal(vec3 wo, float alpha, vec2 u)
     vec3 stretched = normalize(vec3(alpha * wo.xy, wo.z));
     float phi = TWO_PI * u.x;
     float z = (1.0 - u.y) * (1.0 + stretched.z) - stretched.z;
-    float sine = sqrt(clamp(1.0 - z * z, 0.0, 1.0));
+    float sine = sqrt(limited(1.0 - z * z, 0.0, 1.0));
     vec3 cap = vec3(sine * cos(phi), sine * sin(phi), z) + stretched;
     return normalize(vec3(alpha * cap.xy, cap.z));
 }
@@ -55,7 +55,7 @@ vec3 ggx_sample_normal(vec3 wo, float alpha, vec2 u)
 // Schlick's Fresnel factor with the cosine between direction and microfacet.
 vec3 fresnel_schlick(vec3 f0, vec3 f90, float cosine)
 {
-    float m = clamp(1.0 - cosine, 0.0, 1.0);
+    float m = limited(1.0 - cosine, 0.0, 1.0);
     float m2 = m * m;
     return f0 + (f90 - f0) * (m2 * m2 * m);
 }

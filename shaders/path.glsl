@@ -67,12 +67,12 @@ bool path_survives(inout PathState path, float weight, float u)
     if (HAS_GUIDE) {
         throughput *= path.guided;
     }
-    float survival = path.depth >= ROULETTE_START ? min(throughput / weight, 1.0) : 1.0;
+    float survival = path.depth >= ROULETTE_START ? smaller(throughput / weight, 1.0) : 1.0;
     if (path.depth >= LONG_PATH) {
-        survival = min(survival, 1.0 - 2.0 / float(path.depth));
+        survival = smaller(survival, 1.0 - 2.0 / float(path.depth));
     }
     if (HAS_SPECULAR && path.chain >= LONG_CHAIN) {
-        survival = min(survival, 1.0 - 2.0 / float(path.chain));
+        survival = smaller(survival, 1.0 - 2.0 / float(path.chain));
     }
     if (max_component(path.beta) <= 0.0 || u >= survival) {
         return false;
@@ -393,7 +393,7 @@ void path_trace(inout PathState path, inout PathResult result)
         is_hit = trace_closest(ray.origin, ray.direction, 0.0, t_max, from, hit);
     }
     if (HAS_MEDIA && !path.is_search && !is_sensor) {
-        float end = max((is_hit ? hit.t : t_max) + lead, 0.0);
+        float end = larger((is_hit ? hit.t : t_max) + lead, 0.0);
         if (is_shadow) {
             path.shadow.value *= medium_transmittance(scene_medium(path.shadow.interior.current), end);
         } else if (path_scatter(path, result, end) || !path.is_alive) {

@@ -44,10 +44,13 @@ uvec2 pixels_at(uint number)
     return TILE * uvec2(tile % params.tiles_x, tile / params.tiles_x) + pixels_place(number % (TILE * TILE));
 }
 
+// What keys of samples with the same high word have in common: compilers do not take it out of the loop over samples.
+uvec4 pixels_base(uint sample_high) { return rng_base(uvec2(params.seed_low, params.seed_high), sample_high); }
+
 // Key of a sample's random numbers. Batches are aligned, so the low word does not overflow within one.
-uvec4 pixels_key(uvec2 pixel, uint sample_low, uint sample_high)
+uvec4 pixels_key(uvec4 base, uvec2 pixel, uint sample_low)
 {
-    return rng_key(uvec2(params.seed_low, params.seed_high), pixel.y * params.width + pixel.x, sample_low, sample_high);
+    return rng_key(base, pixel.y * params.width + pixel.x, sample_low);
 }
 
 // Adds to a counter of two words, the low one first.

@@ -42,13 +42,17 @@ uvec4 rng_pcg4d(uvec4 v)
     return v;
 }
 
-// Key of one pixel sample. `pixel` counts in the full frame, so that crops and
-// shards see the same numbers. The first round spreads the seed and the high
-// half of the sample index over all words. With HAS_STRATA the last word is the
-// sample's place in its net and the others are the net's.
-uvec4 rng_key(uvec2 seed, uint pixel, uint sample_low, uint sample_high)
+// The seed and the high half of a sample's index, spread over all words.
+uvec4 rng_base(uvec2 seed, uint sample_high)
 {
-    uvec4 base = rng_pcg4d(uvec4(seed, sample_high, 0x9E3779B9u));
+    return rng_pcg4d(uvec4(seed, sample_high, 0x9E3779B9u));
+}
+
+// Key of one pixel sample. `pixel` counts in the full frame, so that crops and
+// shards see the same numbers. With HAS_STRATA the last word is the
+// sample's place in its net and the others are the net's.
+uvec4 rng_key(uvec4 base, uint pixel, uint sample_low)
+{
     if (!HAS_STRATA) {
         return rng_pcg4d(base ^ uvec4(pixel, sample_low, 0u, 0u));
     }

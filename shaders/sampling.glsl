@@ -25,7 +25,7 @@ vec2 sample_triangle(vec2 u)
 float sample_linear(float u, float a, float b)
 {
     float divisor = a + sqrt(mix(a * a, b * b, u));
-    return divisor > 0.0 ? min(u * (a + b) / divisor, 1.0) : u;
+    return divisor > 0.0 ? smaller(u * (a + b) / divisor, 1.0) : u;
 }
 
 // Numbers in (0, 1), multiples of 2⁻²³ plus 2⁻²⁴, moved on by `turn`, multiples of 2⁻²³, around from 1 to 0: exact.

@@ -46,11 +46,12 @@ layout(buffer_reference, scalar, buffer_reference_align = 16) readonly buffer Qu
 layout(buffer_reference, scalar, buffer_reference_align = 8) readonly buffer Pair { uint64_t words; };
 layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer Single { uint word; };
 uint64_t scene_address(uint binding, int i, uint bytes) { return addresses[binding] + uint64_t(uint(i)) * bytes; }
-uvec4 scene_quad(uint binding, int i)
+uvec4 scene_quad_at(uint64_t address)
 {
-    u64vec2 words = Quad(scene_address(binding, i, 16u)).words;
+    u64vec2 words = Quad(address).words;
     return uvec4(unpackUint2x32(words.x), unpackUint2x32(words.y));
 }
+uvec4 scene_quad(uint binding, int i) { return scene_quad_at(scene_address(binding, i, 16u)); }
 uvec2 scene_pair(uint binding, int i) { return unpackUint2x32(Pair(scene_address(binding, i, 8u)).words); }
 uint scene_single(uint binding, int i) { return Single(scene_address(binding, i, 4u)).word; }
 #define texelFetch(array, i) array(i)
@@ -81,18 +82,30 @@ layout(binding = BIND_MEDIA) uniform usamplerBuffer media;
 layout(binding = BIND_GUIDE) uniform usamplerBuffer guide_texels;
 #endif
 
+// Elements of an array that follow each other: where they begin, and the one that is k further. Where arrays are read by addresses
+// there is one address for all, not one for each to be computed in every lane.
+#ifdef ADDRESSES
+#define Row uint64_t
+#define row_of(binding, i) scene_address(binding, int(i), 16u)
+#define row_fetch(array, row, k) scene_quad_at(row + 16u * (k))
+#else
+#define Row int
+#define row_of(binding, i) int(i)
+#define row_fetch(array, row, k) texelFetch(array, row + (k))
+#endif
+
 // Where a group is placed; groups of words that are not used cost nothing.
 Instance scene_instance(uint index)
 {
-    int at = int(INSTANCE_TEXELS * index);
-    uvec4 a = texelFetch(instances, at);
-    uvec4 b = texelFetch(instances, at + 1);
-    uvec4 c = texelFetch(instances, at + 2);
-    uvec4 d = texelFetch(instances, at + 3);
-    uvec4 e = texelFetch(instances, at + 4);
-    uvec4 f = texelFetch(instances, at + 5);
-    uvec4 g = texelFetch(instances, at + 6);
-    uvec4 h = texelFetch(instances, at + 7);
+    Row row = row_of(BIND_INSTANCES, INSTANCE_TEXELS * index);
+    uvec4 a = row_fetch(instances, row, 0);
+    uvec4 b = row_fetch(instances, row, 1);
+    uvec4 c = row_fetch(instances, row, 2);
+    uvec4 d = row_fetch(instances, row, 3);
+    uvec4 e = row_fetch(instances, row, 4);
+    uvec4 f = row_fetch(instances, row, 5);
+    uvec4 g = row_fetch(instances, row, 6);
+    uvec4 h = row_fetch(instances, row, 7);
     return Instance(uintBitsToFloat(a.xyz), a.w, uintBitsToFloat(b.xyz), b.w, uintBitsToFloat(c.xyz), c.w,
                     uintBitsToFloat(d.xyz), d.w, uintBitsToFloat(e.xyz), e.w, uintBitsToFloat(f.xyz), f.w,
                     uintBitsToFloat(g.xyz), g.w, uintBitsToFloat(h.xyz), h.w);
@@ -101,22 +114,22 @@ Instance scene_instance(uint index)
 // A texture in a slot.
 TextureUse scene_texture_use(uint index)
 {
-    int at = int(TEXTURE_USE_TEXELS * index);
-    uvec4 a = texelFetch(texture_uses, at);
-    uvec4 b = texelFetch(texture_uses, at + 1);
-    uvec4 c = texelFetch(texture_uses, at + 2);
+    Row row = row_of(BIND_TEXTURE_USES, TEXTURE_USE_TEXELS * index);
+    uvec4 a = row_fetch(texture_uses, row, 0);
+    uvec4 b = row_fetch(texture_uses, row, 1);
+    uvec4 c = row_fetch(texture_uses, row, 2);
     return TextureUse(uintBitsToFloat(a.xyz), a.w, uintBitsToFloat(b.xyz), b.w, c.x, c.y, c.z, c.w);
 }
 
 // The material's words; groups that are not used cost nothing.
 Material scene_material(uint index)
 {
-    int at = int(MATERIAL_TEXELS * index);
-    uvec4 a = texelFetch(materials, at);
-    uvec4 b = texelFetch(materials, at + 1);
-    uvec4 c = texelFetch(materials, at + 2);
-    uvec4 d = texelFetch(materials, at + 3);
-    uvec4 e = texelFetch(materials, at + 4);
+    Row row = row_of(BIND_MATERIALS, MATERIAL_TEXELS * index);
+    uvec4 a = row_fetch(materials, row, 0);
+    uvec4 b = row_fetch(materials, row, 1);
+    uvec4 c = row_fetch(materials, row, 2);
+    uvec4 d = row_fetch(materials, row, 3);
+    uvec4 e = row_fetch(materials, row, 4);
     vec4 shape = uintBitsToFloat(c);
     return Material(uintBitsToFloat(a.xyz), a.w, uintBitsToFloat(b.xyz), uintBitsToFloat(b.w), shape.x, shape.y, shape.z,
                     shape.w, uintBitsToFloat(d.xyz), uintBitsToFloat(d.w), uintBitsToFloat(e.x), e.y, uintBitsToFloat(e.z),
@@ -126,10 +139,10 @@ Material scene_material(uint index)
 // What fills solids with this material; NONE: the space outside all solids. Groups that are not used cost nothing.
 Medium scene_medium(uint material)
 {
-    int at = int(MEDIUM_TEXELS * (material + 1u));
-    uvec4 a = texelFetch(media, at);
-    uvec4 b = texelFetch(media, at + 1);
-    uvec4 c = texelFetch(media, at + 2);
+    Row row = row_of(BIND_MEDIA, MEDIUM_TEXELS * (material + 1u));
+    uvec4 a = row_fetch(media, row, 0);
+    uvec4 b = row_fetch(media, row, 1);
+    uvec4 c = row_fetch(media, row, 2);
     return Medium(uintBitsToFloat(a.xyz), a.w, uintBitsToFloat(b.xyz), uintBitsToFloat(b.w), uintBitsToFloat(c.x), c.y,
                   c.z, c.w);
 }
@@ -137,13 +150,13 @@ Medium scene_medium(uint material)
 // An entry of the light table; groups that are not used cost nothing.
 Light scene_light(uint index)
 {
-    int at = int(LIGHT_TEXELS * index);
-    uvec4 a = texelFetch(lights, at);
-    uvec4 b = texelFetch(lights, at + 1);
-    uvec4 c = texelFetch(lights, at + 2);
-    uvec4 d = texelFetch(lights, at + 3);
-    uvec4 e = texelFetch(lights, at + 4);
-    uvec4 f = texelFetch(lights, at + 5);
+    Row row = row_of(BIND_LIGHTS, LIGHT_TEXELS * index);
+    uvec4 a = row_fetch(lights, row, 0);
+    uvec4 b = row_fetch(lights, row, 1);
+    uvec4 c = row_fetch(lights, row, 2);
+    uvec4 d = row_fetch(lights, row, 3);
+    uvec4 e = row_fetch(lights, row, 4);
+    uvec4 f = row_fetch(lights, row, 5);
     return Light(a.x, a.y, uintBitsToFloat(a.z), uintBitsToFloat(a.w), uintBitsToFloat(b.xyz), b.w,
                  uintBitsToFloat(c.xyz), c.w, uintBitsToFloat(d.xyz), uintBitsToFloat(d.w), uintBitsToFloat(e.xyz),
                  uintBitsToFloat(e.w), uintBitsToFloat(f.xyz), uintBitsToFloat(f.w));

@@ -99,8 +99,8 @@ const float MAX_INSET = 1.0 / 64.0;
 vec3 surface_error(vec3 magnitude, vec3 e1, vec3 e2)
 {
     float edge = max_component(abs(e1) + abs(e2));
-    float thinness = min(edge * (edge / length(cross(e1, e2))), MAX_THINNESS);
-    float share = 0.25 + 0.125 * max(thinness - PLAIN_THINNESS, 0.0);
+    float thinness = smaller(edge * (edge / length(cross(e1, e2))), MAX_THINNESS);
+    float share = 0.25 + 0.125 * larger(thinness - PLAIN_THINNESS, 0.0);
     return vec3(POSITION_ROUNDINGS * EPSILON) * (magnitude + share * edge);
 }
 
@@ -110,7 +110,7 @@ TriangleShape surface_shape(uint instance, uvec4 triangle)
     surface_corners_of(triangle, a, b, c);
     TriangleShape shape;
     shape.is_mirrored = false;
-    vec3 magnitude = max(abs(a), max(abs(b), abs(c)));
+    vec3 magnitude = larger(abs(a), larger(abs(b), abs(c)));
     if (HAS_INSTANCES && scene_instance(instance).is_identity == 0u) {
         Instance placed = scene_instance(instance);
         mat3 m = mat3(placed.world_from_object_x, placed.world_from_object_y, placed.world_from_object_z);
@@ -198,7 +198,7 @@ float surface_edge(TriangleShape shape, float doubled_area, vec2 bary)
 {
     vec3 weights = vec3(1.0 - bary.x - bary.y, bary);
     vec3 distances = doubled_area * weights / vec3(length(shape.e2 - shape.e1), length(shape.e2), length(shape.e1));
-    return min(distances.x, min(distances.y, distances.z));
+    return smaller(distances.x, smaller(distances.y, distances.z));
 }
 
 SurfaceSide surface_side(Hit hit, vec3 d)
@@ -255,7 +255,7 @@ vec3 surface_emission(Material material, uvec4 triangle, vec2 bary)
 // is left as it is.
 vec3 surface_bend(vec3 n, vec3 ng, vec3 wo)
 {
-    float least = min(MIN_SHADING_COSINE, 0.9 * dot(ng, wo));
+    float least = smaller(MIN_SHADING_COSINE, 0.9 * dot(ng, wo));
     float cosine = dot(n, wo);
     if (cosine < least) {
         n = normalize(n + (least - cosine) * wo);
@@ -365,7 +365,7 @@ vec2 surface_within(TriangleShape shape, float doubled_area, vec2 bary)
     vec3 least = bound / doubled_area * vec3(length(third), length(shape.e2), length(shape.e1));
     least = mix(vec3(0.0), least, lessThan(least, vec3(MAX_INSET)));
     vec3 weights = vec3(1.0 - bary.x - bary.y, bary);
-    vec3 moved = max(weights, least);
+    vec3 moved = larger(weights, least);
     return moved == weights ? bary : moved.yz / (moved.x + moved.y + moved.z);
 }
 
@@ -409,7 +409,7 @@ SurfacePoint surface_point(Hit hit, vec3 wo)
         }
         s.ns = surface_bend(s.is_front ? n : -n, s.ng, wo);
     }
-    s.alpha = HAS_BLEND && (material.flags & MATERIAL_BLEND) != 0u ? clamp(base_color.a, 0.0, 1.0) : 1.0;
+    s.alpha = HAS_BLEND && (material.flags & MATERIAL_BLEND) != 0u ? limited(base_color.a, 0.0, 1.0) : 1.0;
     if (HAS_AREA_LIGHTS && (material.flags & MATERIAL_EMISSIVE) != 0u && (s.is_front || (material.flags & MATERIAL_DOUBLE_SIDED) != 0u)) {
         s.emission = surface_emission(material, triangle, hit.bary);
         s.emission_pdf = material.emission_pdf;
@@ -424,7 +424,7 @@ SurfacePoint surface_point(Hit hit, vec3 wo)
         vec3 tint = surface_texture(material, TEXTURE_SPECULAR_COLOR, triangle, hit.bary).rgb;
         s.strength = material.specular_color * tint * s.dielectric_f90;
         float f0 = material.ior == 0.0 ? 1.0 : square((material.ior - 1.0) / (material.ior + 1.0));
-        s.dielectric_f0 = min(f0 * material.specular_color * tint, vec3(1.0)) * s.dielectric_f90;
+        s.dielectric_f0 = smaller(f0 * material.specular_color * tint, vec3(1.0)) * s.dielectric_f90;
         s.ior = material.ior;
     }
     if (HAS_DIELECTRIC) {

@@ -19,9 +19,9 @@ float texture_wrap(float i, float size, uint mode)
 {
     bool is_mirrored = texture_may(TEXTURE_KIND_MIRROR) && mode == WRAP_MIRROR;
     float period = is_mirrored ? 2.0 * size : size;
-    float k = clamp(i - period * floor(i / period), 0.0, period - 1.0);
+    float k = limited(i - period * floor(i / period), 0.0, period - 1.0);
     k = is_mirrored && k >= size ? period - 1.0 - k : k;
-    return texture_may(TEXTURE_KIND_CLAMP) && mode == WRAP_CLAMP ? clamp(i, 0.0, size - 1.0) : k;
+    return texture_may(TEXTURE_KIND_CLAMP) && mode == WRAP_CLAMP ? limited(i, 0.0, size - 1.0) : k;
 }
 
 float texture_srgb(uint byte)
@@ -59,7 +59,7 @@ vec4 texture_sample(TextureUse use, uint slot, vec2 mesh_uv)
     // Whole periods are removed first: large coordinates keep their precision.
     bvec2 is_clamped = texture_may(TEXTURE_KIND_CLAMP) ? equal(uvec2(wrap_u, wrap_v), uvec2(WRAP_CLAMP)) : bvec2(false);
     uv -= mix(2.0 * floor(0.5 * uv), vec2(0.0), is_clamped);
-    vec2 at = clamp(uv, vec2(-4.0), vec2(4.0)) * size;
+    vec2 at = limited(uv, -4.0, 4.0) * size;
     bool is_nearest = !texture_may(TEXTURE_KIND_LINEAR) || (use.format >> 12u) == FILTER_NEAREST;
     if (texture_may(TEXTURE_KIND_NEAREST) && is_nearest) {
         vec2 i = floor(at);

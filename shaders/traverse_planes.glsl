@@ -99,7 +99,7 @@ bool planes_closest(vec3 origin, vec3 dir, float t_min, float t_max, uint from, 
 #ifdef TRACE_COUNTS
     bvh_records_read++;
 #endif
-    return bvh_intersect(bvh_ray(origin, dir), record, bvh_triangle_texel(record), 0u, t_min, hit);
+    return bvh_intersect(bvh_ray(origin, dir), record, bvh_record_texel(record, 0), 0u, t_min, hit);
 }
 
 // Whether it is known if the ray meets anything; if so, `hit` then has some primitive.

@@ -13,6 +13,7 @@
 #ifndef TRAVERSE_SOFTWARE_GLSL
 #define TRAVERSE_SOFTWARE_GLSL
 
+#include "math.glsl"
 #include "shear.glsl"
 
 #ifdef WGPU
@@ -44,19 +45,20 @@ const uint BVH_SECOND_TURN = 4u;
 const uint BVH_FLAT = 64u;
 const uint BVH_NODE_RECORDS = 24u; // of a node at most
 
-#if defined(WGPU) || defined(ADDRESSES)
-uvec4 bvh_node_texel(uint index) { return texelFetch(bvh_nodes, int(index)); }
-uvec4 bvh_triangle_texel(uint index) { return texelFetch(bvh_triangles, int(index)); }
-#else
-uvec4 bvh_node_texel(uint index) {
-    if (HAS_SMALL_NODES) return bvh_small_nodes[index];
-    return texelFetch(bvh_nodes, int(index));
-}
-uvec4 bvh_triangle_texel(uint index) {
-    if (HAS_SMALL_RECORDS) return bvh_small_records[index];
-    return texelFetch(bvh_triangles, int(index));
-}
+// Texel k of a node or a leaf record.
+uvec4 bvh_node_texel(Row row, int k) {
+#if !defined(WGPU) && !defined(ADDRESSES)
+    if (HAS_SMALL_NODES) return bvh_small_nodes[row + k];
 #endif
+    return row_fetch(bvh_nodes, row, k);
+}
+uvec4 bvh_record_texel(uint record, int k) {
+#if !defined(WGPU) && !defined(ADDRESSES)
+    if (HAS_SMALL_RECORDS) return bvh_small_records[record + uint(k)];
+#endif
+    Row row = row_of(BIND_BVH_TRIANGLES, record);
+    return row_fetch(bvh_triangles, row, k);
+}
 
 // What is computed once for a ray in one space.
 struct BvhRay {
@@ -71,7 +73,7 @@ BvhRay bvh_ray(vec3 origin, vec3 d) {
     BvhRay ray;
     ray.origin = origin;
     ray.negative = lessThan(d, vec3(0.0));
-    vec3 magnitude = max(abs(d), vec3(BVH_MIN_DIRECTION));
+    vec3 magnitude = larger(abs(d), vec3(BVH_MIN_DIRECTION));
     ray.inverse = 1.0 / mix(magnitude, -magnitude, ray.negative);
     ray.octant = (ray.negative.x ? 0u : 0x04040404u) | (ray.negative.y ? 0u : 0x02020202u) |
                  (ray.negative.z ? 0u : 0x01010101u);
@@ -107,17 +109,19 @@ uint bvh_four_hits(uvec3 near_words, uvec3 far_words, vec3 scale, vec3 near_offs
 
 // Visits a node: children in the upper byte of `nodes.y` in order of visit, records in `leaves.y`.
 void bvh_visit(uint index, BvhRay ray, float t_min, float t_max, out uvec2 nodes, out uvec2 leaves) {
-    uvec4 head = bvh_node_texel(5u * index);
-    uvec4 links = bvh_node_texel(5u * index + 1u);
-    uvec4 x = bvh_node_texel(5u * index + 2u);
-    uvec4 y = bvh_node_texel(5u * index + 3u);
-    uvec4 z = bvh_node_texel(5u * index + 4u);
+    Row row = row_of(BIND_BVH_NODES, 5u * index);
+    // The first and the last at once: a node lies in two cache lines, and so one is waited for while the other comes.
+    uvec4 head = bvh_node_texel(row, 0);
+    uvec4 z = bvh_node_texel(row, 4);
+    uvec4 links = bvh_node_texel(row, 1);
+    uvec4 x = bvh_node_texel(row, 2);
+    uvec4 y = bvh_node_texel(row, 3);
 
     vec3 cell = uintBitsToFloat(((uvec3(head.w) >> uvec3(0u, 8u, 16u)) & 0xFFu) << 23u);
     vec3 from_origin = uintBitsToFloat(head.xyz) - ray.origin;
     // The far side of the box along any axis bounds every distance in it.
     vec3 reach = abs(from_origin) + 255.0 * cell;
-    float pad = max(reach.x, max(reach.y, reach.z)) * BVH_BOX_ROUNDING;
+    float pad = larger(reach.x, larger(reach.y, reach.z)) * BVH_BOX_ROUNDING;
     vec3 scale = cell * ray.inverse;
     vec3 offset = from_origin * ray.inverse;
     vec3 slack = abs(ray.inverse) * pad;
@@ -142,9 +146,9 @@ vec2 bvh_weights(vec3 edges, float sum, uint turn) {
 
 // Meets a record's triangles, v0 v1 v2 and v0 v2 v3, and takes a hit that is nearer.
 bool bvh_intersect(BvhRay ray, uint record, uvec4 v0, uint instance, float t_min, inout Hit hit) {
-    uvec4 v1 = bvh_triangle_texel(record + 1u);
-    uvec4 v2 = bvh_triangle_texel(record + 2u);
-    uvec4 v3 = bvh_triangle_texel(record + 3u);
+    uvec4 v1 = bvh_record_texel(record, 1);
+    uvec4 v2 = bvh_record_texel(record, 2);
+    uvec4 v3 = bvh_record_texel(record, 3);
     vec3 a = shear_vertex(ray.shear, ray.origin, uintBitsToFloat(v0.xyz));
     vec3 b = shear_vertex(ray.shear, ray.origin, uintBitsToFloat(v1.xyz));
     vec3 c = shear_vertex(ray.shear, ray.origin, uintBitsToFloat(v2.xyz));
@@ -281,7 +285,7 @@ void bvh_trace(vec3 origin, vec3 dir, float t_min, float t_max, uint from, bool 
         if (leaves.y != 0u) {
             uint record = 4u * (leaves.x + uint(findLSB(leaves.y)));
             leaves.y &= leaves.y - 1u;
-            uvec4 v0 = bvh_triangle_texel(record);
+            uvec4 v0 = bvh_record_texel(record, 0);
 #ifdef TRACE_COUNTS
             bvh_records_read++;
 #endif

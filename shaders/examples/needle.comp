@@ -57,7 +57,7 @@ void main()
     uint invocation = push.first + gl_GlobalInvocationID.x;
     vec2 sum = vec2(0.0);
     for (uint i = 0u; i < THROWS; i++) {
-        uvec4 key = rng_key(uvec2(push.seed, KIND), invocation, i, 0u);
+        uvec4 key = rng_key(rng_base(uvec2(push.seed, KIND), 0u), invocation, i);
         float value = needle_value(needle_position(rng_uniform(key, 0u, 0u)));
         sum += vec2(value, value * value);
         if (invocation < push.kept) {

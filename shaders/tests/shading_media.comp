@@ -63,7 +63,7 @@ void main()
         if (i >= push.cases * push.draws) {
             return;
         }
-        uvec4 key = rng_key(uvec2(push.seed, push.kind), i, 0u, 0u);
+        uvec4 key = rng_key(rng_base(uvec2(push.seed, push.kind), 0u), i, 0u);
         answers[i] = answer(cases[i / push.draws], rng_uniform(key, 1u, SLOT_MEDIUM));
     }
 }

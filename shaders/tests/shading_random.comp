@@ -31,7 +31,7 @@ void main()
     }
     uint carry;
     uint low = uaddCarry(push.first_sample_low, i % push.samples, carry);
-    uvec4 key = rng_key(uvec2(push.seed_low, push.seed_high), push.first_pixel + i / push.samples,
-                        low, push.first_sample_high + carry);
+    uvec4 base = rng_base(uvec2(push.seed_low, push.seed_high), push.first_sample_high + carry);
+    uvec4 key = rng_key(base, push.first_pixel + i / push.samples, low);
     draws[i] = Draw(key, rng_uniform(key, push.event, push.slot));
 }

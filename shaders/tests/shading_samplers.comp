@@ -82,7 +82,7 @@ void main()
         if (push.is_lattice != 0u) {
             u = lattice(i * invocations + invocation);
         } else {
-            uvec4 key = rng_key(uvec2(push.seed, index), invocation, i, 0u);
+            uvec4 key = rng_key(rng_base(uvec2(push.seed, index), 0u), invocation, i);
             u = rng_uniform(key, 1u, SLOT_BSDF).xyz;
         }
         vec2 at;

@@ -57,7 +57,7 @@ pub const MUTANTS: &[Mutant] = &[
         wrong: "survival is the square of the throughput",
         file: "shaders/path.glsl",
         edits: &[(
-            "min(throughput / weight, 1.0) : 1.0;",
+            "smaller(throughput / weight, 1.0) : 1.0;",
             "square(min(max_component(path.beta), 1.0)) : 1.0;",
         )],
         killers: &["integrator::closed::closed_room_sums_the_series"],
@@ -176,10 +176,7 @@ pub const MUTANTS: &[Mutant] = &[
         name: "silent-cut",
         wrong: "what the depth limit cuts off is not counted",
         file: "shaders/kernel_path.glsl",
-        edits: &[(
-            "truncated += result.truncated > 0.0 ? 1u : 0u;",
-            "truncated += 0u;",
-        )],
+        edits: &[("lane.truncated++;", "lane.truncated += 0u;")],
         killers: &["integrator::closed::closed_room_sums_the_series"],
     },
     Mutant {
@@ -253,7 +250,7 @@ pub const MUTANTS: &[Mutant] = &[
         name: "sample-zero-twice",
         wrong: "the first sample is counted twice and the second never",
         file: "shaders/kernel_path.glsl",
-        edits: &[("low + i, high)", "low + (i == 1u ? 0u : i), high)")],
+        edits: &[("low + i)", "low + (i == 1u ? 0u : i))")],
         killers: &[
             "integrator::determinism::same_seed_gives_the_same_bits_however_the_work_is_cut",
         ],
@@ -262,7 +259,7 @@ pub const MUTANTS: &[Mutant] = &[
         name: "shard-seed",
         wrong: "every pass and every shard draws the same numbers",
         file: "shaders/kernel_path.glsl",
-        edits: &[("low + i, high)", "i, high)")],
+        edits: &[("low + i)", "i)")],
         killers: &[
             "integrator::determinism::same_seed_gives_the_same_bits_however_the_work_is_cut",
         ],

@@ -334,8 +334,8 @@ pub const MUTANTS: &[Mutant] = &[
         wrong: "a spot's ramp is not squared",
         file: "shaders/lights.glsl",
         edits: &[(
-            "s.radiance *= square(clamp(ramp, 0.0, 1.0));",
-            "s.radiance *= clamp(ramp, 0.0, 1.0);",
+            "s.radiance *= square(limited(ramp, 0.0, 1.0));",
+            "s.radiance *= limited(ramp, 0.0, 1.0);",
         )],
         killers: &["integrator::punctual::spot_light_falls_off_between_its_cones"],
     },
@@ -381,8 +381,8 @@ pub const MUTANTS: &[Mutant] = &[
         wrong: "the tree of lights takes clusters for dark whose middle is below the horizon of the surface",
         file: "shaders/light_tree.glsl",
         edits: &[(
-            "light_not_negative(cosine + sine + CLUSTER_SLACK)",
-            "light_not_negative(cosine)",
+            "limited(cosine + sine + CLUSTER_SLACK, 0.0, 1.0)",
+            "limited(cosine, 0.0, 1.0)",
         )],
         killers: &["integrator::lamps::points_below_the_floor_hide_none_above"],
     },

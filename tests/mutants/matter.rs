@@ -315,7 +315,7 @@ pub const MUTANTS: &[Mutant] = &[
         name: "segment-beam",
         wrong: "the tree of lights asks of a segment in a spot's cone for its ends alone",
         file: "shaders/light_tree.glsl",
-        edits: &[("a > 0.0 ? vec2(clamp(b * c / a, x.x, x.y)) : x;", "x;")],
+        edits: &[("a > 0.0 ? vec2(limited(b * c / a, x.x, x.y)) : x;", "x;")],
         killers: &["matter::fog::single_scattering_of_many_spots"],
     },
     Mutant {
