@@ -57,10 +57,8 @@ void kernel_next(inout KernelLane lane, inout FilmNode levels[FILM_LEVELS], inou
 {
     if (lane.i < lane.count) {
         lane.rays += result.rays;
-        if (result.truncated > 0.0) {
-            lane.truncated++;
-            lane.truncated_throughput += uint(result.truncated * 65536.0 + 0.5);
-        }
+        lane.truncated += result.truncated > 0.0 ? 1u : 0u;
+        lane.truncated_throughput += whole_long(floor(smaller(result.truncated * 65536.0 + 0.5, 4294967040.0)));
         bool is_dropped = !is_finite(result.radiance);
         lane.non_finite += is_dropped ? 1u : 0u;
 

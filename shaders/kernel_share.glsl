@@ -64,10 +64,8 @@ void main()
             rays += result.rays;
             bool is_dropped = !is_finite(radiance);
             if (is_kept) {
-                if (result.truncated > 0.0) {
-                    truncated++;
-                    truncated_throughput += uint(result.truncated * 65536.0 + 0.5);
-                }
+                truncated += result.truncated > 0.0 ? 1u : 0u;
+                truncated_throughput += whole_long(floor(smaller(result.truncated * 65536.0 + 0.5, 4294967040.0)));
                 non_finite += is_dropped ? 1u : 0u;
             }
             node = FilmNode(is_dropped ? vec3(0.0) : radiance, vec3(0.0), vec3(0.0), result.first.albedo, result.first.normal,

@@ -32,6 +32,13 @@ int whole(float x)
     return floatBitsToInt(x + 8388608.0) - 0x4B000000;
 }
 
+// x, a whole number from 0 to 2³² − 1.
+uint whole_long(float x)
+{
+    float high = floor(x * (1.0 / 65536.0));
+    return uint(whole(high)) << 16u | uint(whole(x - 65536.0 * high));
+}
+
 // The larger and the smaller number, or b where one is NaN. Of max and min lavapipe makes several instructions, for the sake of
 // NaN and since it halves vectors of 512 bits for them; of these one.
 float larger(float a, float b)

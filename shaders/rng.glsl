@@ -100,14 +100,16 @@ uint rng_shuffle(uint place, uint word)
 // and, without w, a (0, 4, 3)-net. The first digit after the point is the lowest bit.
 uvec4 rng_net(uint place)
 {
-    const uvec4 columns[NET_LEVEL] = uvec4[](
-        uvec4(88u, 1u, 1u, 241u), uvec4(100u, 2u, 3u, 244u), uvec4(242u, 4u, 5u, 211u), uvec4(17u, 8u, 15u, 45u),
-        uvec4(158u, 16u, 17u, 172u), uvec4(211u, 32u, 51u, 71u), uvec4(185u, 64u, 85u, 9u), uvec4(132u, 128u, 255u, 92u));
-    uvec4 v = uvec4(0u);
+    // Of the generator matrices, those of x, y, z and w a byte each, x the lowest.
+    const uint columns[NET_LEVEL] = uint[](
+        0xF1010158u, 0xF4030264u, 0xD30504F2u, 0x2D0F0811u,
+        0xAC11109Eu, 0x473320D3u, 0x095540B9u, 0x5CFF8084u);
+    uint v = 0u;
     for (uint k = 0u; k < NET_LEVEL; k++) {
-        v ^= columns[k] * (place >> k & 1u);
+        // all bits of the digit alike
+        v ^= columns[k] & uint(bitfieldExtract(int(place), int(k), 1));
     }
-    return v;
+    return (uvec4(v) >> uvec4(0u, 8u, 16u, 24u)) & 0xFFu;
 }
 
 uint rng_dimension(uint event, uint slot)

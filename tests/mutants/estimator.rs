@@ -176,7 +176,10 @@ pub const MUTANTS: &[Mutant] = &[
         name: "silent-cut",
         wrong: "what the depth limit cuts off is not counted",
         file: "shaders/kernel_path.glsl",
-        edits: &[("lane.truncated++;", "lane.truncated += 0u;")],
+        edits: &[(
+            "truncated += result.truncated > 0.0 ? 1u : 0u;",
+            "truncated += 0u;",
+        )],
         killers: &["integrator::closed::closed_room_sums_the_series"],
     },
     Mutant {
@@ -213,7 +216,7 @@ pub const MUTANTS: &[Mutant] = &[
         name: "net-column",
         wrong: "one digit of one column of the nets is wrong",
         file: "shaders/rng.glsl",
-        edits: &[("uvec4(185u, 64u, 85u, 9u)", "uvec4(184u, 64u, 85u, 9u)")],
+        edits: &[("0x095540B9u", "0x095540B8u")],
         killers: &["shading::nets::samples_in_turn_are_nets"],
     },
     Mutant {
