@@ -32,6 +32,7 @@ vec2 environment_uv(vec3 d)
 vec4 environment_texel(int x, int y)
 {
     int width = int(params.env_width);
+    // bounds also for what became of a NaN
     x = clamp(x < 0 ? x + width : (x >= width ? x - width : x), 0, width - 1);
     y = clamp(y, 0, int(params.env_height) - 1);
     return texelFetch(env_map, y * width + x);
