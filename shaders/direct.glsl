@@ -145,11 +145,10 @@ DirectLight direct_sample(SurfacePoint s, Bsdf bsdf, mat3 frame, vec3 wo, LightC
 }
 
 // The same by several samples of lights: one, in proportion to what it gives if nothing is in the way, with the mean of
-// what all give [Talbot05]. They have the first one's numbers, turned, so that they are spread evenly.
-DirectLight direct_on_surface(SurfacePoint s, Bsdf bsdf, mat3 frame, vec3 wo, uvec4 key, uint event, bool is_first)
+// what all give [Talbot05]. They have the first one's numbers, u, turned, so that they are spread evenly.
+DirectLight direct_on_surface(SurfacePoint s, Bsdf bsdf, mat3 frame, vec3 wo, uvec4 key, uint event, vec4 u, bool is_first)
 {
     LightView view = light_view_surface(s.position, direct_normal(s, bsdf));
-    vec4 u = rng_uniform(key, event, SLOT_LIGHT);
     int count = direct_candidates(is_first);
     if (count == 1) {
         return direct_sample(s, bsdf, frame, wo, light_choose(view, u), u, count);

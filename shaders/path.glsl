@@ -256,7 +256,7 @@ void path_shadow(inout PathState path, inout PathResult result, bool is_hit, Sur
 
 // What the path does at the surface s: emission, direct light, scattering.
 void path_surface(inout PathState path, inout PathResult result, SurfacePoint s, bool is_solid, Boundary boundary, mat3 frame,
-                  Bsdf bsdf)
+                  Bsdf bsdf, PathDraws draws)
 {
     vec3 wo = -path.ray.direction;
     vec3 wo_local = wo * frame;
@@ -300,7 +300,7 @@ void path_surface(inout PathState path, inout PathResult result, SurfacePoint s,
     }
     // Direct light. A mirror has no density that a light's sample could meet.
     if (HAS_LIGHTS && !IS_PHOTON && !is_last && bsdf_has_density(bsdf)) {
-        DirectLight direct = direct_on_surface(s, bsdf, frame, wo_local, path.key, path.event, path.depth == 0u);
+        DirectLight direct = direct_on_surface(s, bsdf, frame, wo_local, path.key, path.event, draws.light, path.depth == 0u);
         if (!(direct.value.x + direct.value.y + direct.value.z <= 0.0)) {
             bool is_beyond = HAS_DIELECTRIC && dot(direct.light.wi, s.ng) < 0.0;
             vec3 origin = is_beyond ? far_side : offset_origin(s.start, s.error, s.ng);
@@ -314,7 +314,7 @@ void path_surface(inout PathState path, inout PathResult result, SurfacePoint s,
         }
     }
 
-    vec4 u = rng_uniform(path.key, path.event, SLOT_BSDF);
+    vec4 u = draws.bsdf;
     BsdfSample next = bsdf_sample(bsdf, wo_local, u.xyz);
     if (HAS_GUIDE && bsdf_has_density(bsdf)) {
         vec4 u_guide = rng_uniform(path.key, path.event, SLOT_GUIDE);
@@ -384,6 +384,10 @@ void path_trace(inout PathState path, inout PathResult result)
     }
     if (HAS_NESTED) {
         surface_skip_triangle(HAS_INSIDE && path.is_search ? path.search.last : uvec2(NONE));
+    }
+    PathDraws draws;
+    if (IS_FLAT) {
+        draws = path_draws(path);
     }
     Hit hit;
     bool is_sensor = path.is_sensor && !is_shadow && !path.is_search;
@@ -457,7 +461,10 @@ void path_trace(inout PathState path, inout PathResult result)
     if (is_shadow) {
         path_shadow(path, result, is_hit, s, through, boundary.beyond);
     } else {
-        path_surface(path, result, s, is_solid, boundary, frame, bsdf);
+        if (!IS_FLAT) {
+            draws = path_draws(path);
+        }
+        path_surface(path, result, s, is_solid, boundary, frame, bsdf, draws);
     }
 }
 

@@ -5,6 +5,7 @@
 
 #include "direct.glsl"
 #include "interior.glsl"
+#include "rng.glsl"
 
 // What the first hit looks like, for the feature layers.
 struct FirstHit {
@@ -57,6 +58,21 @@ PathResult path_result()
     result.truncated = 0.0;
     result.rays = 0u;
     return result;
+}
+
+// Random numbers of the path's event at a surface.
+struct PathDraws {
+    vec4 light;
+    vec4 bsdf;
+};
+
+// Drawn at once, and where pieces are tested without a walk before them: each number is a chain of products, during which a
+// CPU has time for what does not depend on it.
+const bool IS_FLAT = PARALLELOGRAM_COUNT + TRIANGLE_COUNT > 0u;
+
+PathDraws path_draws(PathState path)
+{
+    return PathDraws(rng_uniform(path.key, path.event, SLOT_LIGHT), rng_uniform(path.key, path.event, SLOT_BSDF));
 }
 
 #endif

@@ -9,6 +9,8 @@
 #ifndef SHEAR_GLSL
 #define SHEAR_GLSL
 
+#include "math.glsl"
+
 // Rows of the shear that takes a direction to the z axis, and its largest component to one.
 struct Shear {
     vec3 x;
@@ -17,23 +19,18 @@ struct Shear {
 };
 
 Shear shear_along(vec3 d) {
-    // Factors 0 and 1 are exact, so that this equals [Woop13] without its permutation of axes.
     vec3 a = abs(d);
-    Shear shear;
-    if (a.x >= a.y && a.x >= a.z) {
-        shear.x = vec3(-d.y / d.x, 1.0, 0.0);
-        shear.y = vec3(-d.z / d.x, 0.0, 1.0);
-        shear.z = vec3(1.0 / d.x, 0.0, 0.0);
-    } else if (a.y >= a.z) {
-        shear.x = vec3(0.0, -d.z / d.y, 1.0);
-        shear.y = vec3(1.0, -d.x / d.y, 0.0);
-        shear.z = vec3(0.0, 1.0 / d.y, 0.0);
-    } else {
-        shear.x = vec3(1.0, 0.0, -d.x / d.z);
-        shear.y = vec3(0.0, 1.0, -d.y / d.z);
-        shear.z = vec3(0.0, 0.0, 1.0 / d.z);
-    }
-    return shear;
+    bool is_x = a.x >= a.y && a.x >= a.z;
+    bool is_y = !is_x && a.y >= a.z;
+    // Numerators are chosen, not quotients: a CPU takes long to divide.
+    float largest = is_x ? d.x : is_y ? d.y : d.z;
+    float x = -(is_x ? d.y : is_y ? d.z : d.x) / largest;
+    float y = -(is_x ? d.z : is_y ? d.x : d.y) / largest;
+    float z = 1.0 / largest;
+    // Factors 0 and 1 are exact, so that this equals [Woop13] without its permutation of axes.
+    if (is_x) return Shear(vec3(x, 1.0, 0.0), vec3(y, 0.0, 1.0), vec3(z, 0.0, 0.0));
+    if (is_y) return Shear(vec3(0.0, x, 1.0), vec3(1.0, y, 0.0), vec3(0.0, z, 0.0));
+    return Shear(vec3(1.0, 0.0, x), vec3(0.0, 1.0, y), vec3(0.0, 0.0, z));
 }
 
 vec3 shear_vertex(Shear shear, vec3 origin, vec3 vertex) {
@@ -49,14 +46,9 @@ float shear_cross(vec3 a, vec3 b) {
     return product;
 }
 
-// Whether the edge functions have one sign; zero is both. Comparisons instead of min and max, which take three
-// instructions each on lavapipe for the sake of NaN; `precise` keeps them.
+// Whether the edge functions have one sign; zero is both.
 bool shear_inside(vec3 edges) {
-    precise float least = edges.x < edges.y ? edges.x : edges.y;
-    least = edges.z < least ? edges.z : least;
-    precise float most = edges.x > edges.y ? edges.x : edges.y;
-    most = edges.z > most ? edges.z : most;
-    return least >= 0.0 || most <= 0.0;
+    return smaller(edges.z, smaller(edges.x, edges.y)) >= 0.0 || larger(edges.z, larger(edges.x, edges.y)) <= 0.0;
 }
 
 // Meets a single triangle; `bary` holds the weights of its second and third vertex.

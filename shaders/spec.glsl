@@ -52,6 +52,17 @@ const bool HAS_GUIDE = false;
 layout(constant_id = 29) const bool HAS_GUIDE = true;      // photons tell where bent light comes from
 #endif
 
+// Pieces whose normals and gradients of coordinates have nothing along an axis, a bit each: what is known costs nothing.
+layout(constant_id = 30) const uint NORMAL_WITHOUT_X = 0u;
+layout(constant_id = 31) const uint NORMAL_WITHOUT_Y = 0u;
+layout(constant_id = 32) const uint NORMAL_WITHOUT_Z = 0u;
+layout(constant_id = 33) const uint U_WITHOUT_X = 0u;
+layout(constant_id = 34) const uint U_WITHOUT_Y = 0u;
+layout(constant_id = 35) const uint U_WITHOUT_Z = 0u;
+layout(constant_id = 36) const uint V_WITHOUT_X = 0u;
+layout(constant_id = 37) const uint V_WITHOUT_Y = 0u;
+layout(constant_id = 38) const uint V_WITHOUT_Z = 0u;
+
 // Traversals ask surface_is_opaque of triangles that are marked.
 const bool HAS_CANDIDATES = HAS_ALPHA || HAS_NESTED;
 

@@ -56,6 +56,8 @@ pub struct Spec {
     pub parallelograms: u32,
     /// … and triangles.
     pub triangles: u32,
+    /// Of their normals and the gradients of their coordinates, for each component the pieces where it is 0, a bit each.
+    pub without: [u32; 9],
     /// Which slots of materials are filled, and with what: bits `TEXTURE_KIND_*`.
     pub texture_kinds: u32,
     /// The device's structures hold boxes, and shaders test the triangles.
@@ -161,6 +163,7 @@ impl Spec {
             strategy: self.strategy,
             parallelograms: self.parallelograms,
             triangles: self.triangles,
+            without: self.without,
             texture_kinds: u32::MAX,
             boxes: self.boxes,
             small_nodes: self.small_nodes,
@@ -224,7 +227,8 @@ impl Spec {
                     .chain([strategy, self.parallelograms, self.triangles])
                     .chain([self.texture_kinds])
                     .chain([self.boxes, self.small_nodes, self.small_records].map(u32::from))
-                    .chain([self.allotment, self.guide].map(u32::from)),
+                    .chain([self.allotment, self.guide].map(u32::from))
+                    .chain(self.without),
             )
             .collect()
     }

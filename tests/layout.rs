@@ -116,6 +116,15 @@ fn specialisation_constants_are_the_same_in_rust_and_glsl() {
             "HAS_SMALL_RECORDS",
             "HAS_ALLOTMENT",
             "HAS_GUIDE",
+            "NORMAL_WITHOUT_X",
+            "NORMAL_WITHOUT_Y",
+            "NORMAL_WITHOUT_Z",
+            "U_WITHOUT_X",
+            "U_WITHOUT_Y",
+            "U_WITHOUT_Z",
+            "V_WITHOUT_X",
+            "V_WITHOUT_Y",
+            "V_WITHOUT_Z",
         ]
         .map(String::from),
     );

@@ -54,9 +54,22 @@ impl Planes {
     pub fn note(&self, spec: &mut Spec, params: &mut layout::Params) {
         spec.parallelograms = self.parallelograms;
         spec.triangles = self.list.len() as u32 - self.parallelograms;
+        spec.without = without(&self.list);
         params.planes_center = self.center.to_array();
         params.planes_extent = self.extent.to_array();
     }
+}
+
+/// For each component of normals and gradients the pieces that have none, a bit each.
+fn without(list: &[Plane]) -> [u32; 9] {
+    let mut bits = [0; 9];
+    for (i, plane) in list.iter().enumerate() {
+        let components = [plane.normal, plane.u, plane.v].into_iter().flatten();
+        for (bits, component) in bits.iter_mut().zip(components) {
+            *bits |= u32::from(component == 0.0) << i;
+        }
+    }
+    bits
 }
 
 /// A piece with its bounds, to first order in [`UNIT`] with every rounding at its worst.
@@ -72,6 +85,13 @@ fn plane(patch: &Patch, center: DVec3, extent: DVec3) -> Option<Plane> {
     let corners = patch.corners.map(|corner| corner - center);
     let [a, b, c, d] = corners;
     let normal = (b - a).cross(c - a).normalize();
+    // Along an axis it is the axis itself, which kernels know.
+    let is_zero = normal.as_vec3().cmpeq(Vec3::ZERO);
+    let normal = if is_zero.bitmask().count_ones() == 2 {
+        DVec3::select(is_zero, DVec3::ZERO, DVec3::ONE)
+    } else {
+        normal
+    };
     let doubled = (b - a).cross(c - a).length();
     // u grows along p and v along q.
     let (p, q) = (b - a, if patch.is_parallelogram { d - a } else { c - a });

@@ -215,10 +215,14 @@ pub const MUTANTS: &[Mutant] = &[
         name: "planes-edge",
         wrong: "flat pieces of small scenes are surely met beside their edges, too",
         file: "shaders/traverse_planes.glsl",
-        edits: &[(
-            "!is_left && inside > edge &&",
-            "!is_left && inside > -edge &&",
-        )],
+        edits: &[("reach < bound - edge &&", "reach < bound + edge &&")],
+        killers: &["traversal::planes::few_flat_pieces_are_met_as_in_the_tree"],
+    },
+    Mutant {
+        name: "planes-axis",
+        wrong: "flat pieces across the x axis have the y axis as their normal",
+        file: "shaders/traverse_planes.glsl",
+        edits: &[("uvec3(only_x, only_y,", "uvec3(only_y, only_x,")],
         killers: &["traversal::planes::few_flat_pieces_are_met_as_in_the_tree"],
     },
     Mutant {
@@ -226,8 +230,8 @@ pub const MUTANTS: &[Mutant] = &[
         wrong: "what meets an edge of a triangle exactly misses it",
         file: "shaders/shear.glsl",
         edits: &[(
-            "return least >= 0.0 || most <= 0.0;",
-            "return least > 0.0 || most < 0.0;",
+            "smaller(edges.x, edges.y)) >= 0.0 || larger(edges.z, larger(edges.x, edges.y)) <= 0.0",
+            "smaller(edges.x, edges.y)) > 0.0 || larger(edges.z, larger(edges.x, edges.y)) < 0.0",
         )],
         killers: &["traversal::watertight::closed_meshes_have_no_gaps"],
     },
