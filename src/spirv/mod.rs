@@ -36,6 +36,7 @@ mod op {
     pub const SELECT: u32 = 169;
     pub const I_EQUAL: u32 = 170;
     pub const I_NOT_EQUAL: u32 = 171;
+    pub const U_GREATER_THAN: u32 = 172;
     pub const SHIFT_RIGHT_LOGICAL: u32 = 194;
     pub const SHIFT_LEFT_LOGICAL: u32 = 196;
     pub const BITWISE_OR: u32 = 197;
@@ -246,6 +247,7 @@ impl Known {
             op::LOGICAL_NOT => a.with(Value::Is(0), |a, _| u32::from(a == 0)),
             op::LOGICAL_EQUAL | op::I_EQUAL => a.with(b, |a, b| u32::from(a == b)),
             op::LOGICAL_NOT_EQUAL | op::I_NOT_EQUAL => a.with(b, |a, b| u32::from(a != b)),
+            op::U_GREATER_THAN => a.with(b, |a, b| u32::from(a > b)),
             op::SELECT => match a {
                 Value::Is(0) => operand(2),
                 Value::Is(_) => b,
@@ -321,6 +323,10 @@ mod tests {
             (op::SPEC_CONSTANT_OP, &[BOOL, 17, op::I_EQUAL, 16, 12]),
             (op::SPEC_CONSTANT_OP, &[INT, 18, op::I_ADD, 16, 13]),
             (op::SPEC_CONSTANT_COMPOSITE, &[3, 19, 16, 18]),
+            (
+                op::SPEC_CONSTANT_OP,
+                &[BOOL, 20, op::U_GREATER_THAN, 18, 16],
+            ),
         ]);
         // 11 keeps its own
         let expected = words(&[
@@ -336,6 +342,7 @@ mod tests {
             (op::CONSTANT_TRUE, &[BOOL, 17]),
             (op::CONSTANT, &[INT, 18, 15]),
             (op::CONSTANT_COMPOSITE, &[3, 19, 16, 18]),
+            (op::CONSTANT_TRUE, &[BOOL, 20]),
         ]);
         assert_eq!(specialised(&module, &[(0, 0), (2, 9)]), expected);
     }
