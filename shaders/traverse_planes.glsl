@@ -80,8 +80,8 @@ PlaneRay planes_ray(vec3 origin, vec3 dir, float t_min) {
 }
 
 // Surely met are pieces before the distance `nearest`, possibly met those before `farthest`, if the ray neither leaves them nor
-// ends on them. Conditions are joined so that each is one comparison under the mask of the one before; of what is not a
-// number none is true.
+// ends on them. Conditions are joined so that each is one comparison under the mask of the one before. No comparison with what
+// is not a number is true, so that such a piece is possible and not sure.
 PlaneMeeting planes_meet(PlaneRay ray, Plane plane, bool is_triangle, bool is_other, float nearest, float farthest) {
     float inverse = -1.0 / dot(ray.dir, plane.normal);
     float t = (dot(ray.origin, plane.normal) + plane.offset) * inverse;
