@@ -13,7 +13,8 @@ source scripts/setup.sh
 unset DISPLAY WAYLAND_DISPLAY
 
 readonly OPENJD_VERSION=0.8.0
-readonly SHARDS=4 SAMPLES=2048
+# A shard takes many times the second after which it has a checkpoint, so that it can be killed with one.
+readonly SHARDS=4 SAMPLES=16384
 # Seconds that a farm may take.
 readonly PATIENCE=300
 scene="$PWD/scenes/cornell.gltf"
