@@ -148,6 +148,17 @@ repair_shaderc() {
     export SHADERC_LIB_DIR="$CACHE/shaderc"
 }
 
+# Cargo tells what two checkouts build in one folder apart by time alone: of the older one it would run what the newer one built.
+make_anew_after_another_checkout() {
+    local note="$CARGO_TARGET_DIR/checkout"
+    if [[ -d "$CARGO_TARGET_DIR/release" && "$(cat "$note" 2>/dev/null)" != "$PWD" ]]; then
+        say "what $CARGO_TARGET_DIR has of etendue is of another checkout: it is built anew"
+        cargo clean --quiet --locked --release --package etendue
+    fi
+    mkdir -p "$CARGO_TARGET_DIR"
+    printf '%s\n' "$PWD" >"$note"
+}
+
 if command -v apt-get >/dev/null; then install_packages; else check_tools; fi
 cargo_folder="$(find_cargo)" || die "installed, but there is still no cargo of version $RUST_VERSION or newer"
 path_hint=
@@ -165,4 +176,5 @@ if [[ "${BASH_SOURCE[0]}" == "$0" ]]; then
 else
     # Outside the clone, so that a build never shows up in it.
     export CARGO_TARGET_DIR="${CARGO_TARGET_DIR:-$CACHE/target}"
+    make_anew_after_another_checkout
 fi

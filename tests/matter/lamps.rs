@@ -127,5 +127,7 @@ fn lamp_in_fog_behind_a_boundary() {
     let medium = grey(0.05, 0.4, Phase::HenyeyGreenstein { g: 0.3 });
     let fog = block(Vec3::new(-2.0, 0.2, -2.0), Vec3::new(2.0, 2.6, 2.0));
     let scene = scene_with(Some((fog, glass(1.0, medium), DAffine3::IDENTITY)));
-    assert_counted_once("fog", &scene, [1024, 2048, 8192], 3e-2);
+    // Light samples alone have no finite variance next to a lamp: of a ray that passes its sampled point at a distance D
+    // they count 1/D, over a disc. So one sample decides the mean of few: of 13 seeds one had ±6e-2 with 2048.
+    assert_counted_once("fog", &scene, [1024, 8192, 8192], 3e-2);
 }
