@@ -185,10 +185,20 @@ DirectLight direct_on_surface(SurfacePoint s, Bsdf bsdf, mat3 frame, vec3 wo, uv
     return direct;
 }
 
-// Density, relative to that of the flight's own, with which the light at `point` would have drawn its distance.
-float direct_equiangular_ratio(Flight flight, vec3 point)
+// The flight as it is seen from `point`, which is on a light.
+Equiangular direct_equiangular(Flight flight, vec3 point)
 {
-    return equiangular_pdf(equiangular_of(flight.origin, flight.direction, flight.end, point), flight.distance) / flight.pdf;
+    return equiangular_of(flight.origin, flight.direction, flight.end, point);
+}
+
+// The same of the light that was chosen for it: a spot sees what lies in its cone.
+Equiangular direct_equiangular_of(Flight flight, LightChoice choice, vec3 point)
+{
+    Equiangular e = direct_equiangular(flight, point);
+    if (HAS_PUNCTUAL && choice.light.kind == LIGHT_SPOT && e.apart > 0.0) {
+        equiangular_within(e, flight.origin, flight.direction, point, choice.light.direction, choice.light.cos_outer);
+    }
+    return e;
 }
 
 // Weight of a light that scattering in a medium found, against direct light from
@@ -199,7 +209,7 @@ float direct_found_weight(Flight flight, float pdf_phase, float pdf_light, vec3 
         return direct_bsdf_weight(pdf_phase, pdf_light);
     }
     float ratio = pdf_light / pdf_phase;
-    float equiangular = direct_equiangular_ratio(flight, point);
+    float equiangular = equiangular_pdf(direct_equiangular(flight, point), flight.distance) / flight.pdf;
     return 1.0 / (1.0 + ratio * ratio * (1.0 + equiangular * equiangular));
 }
 
@@ -219,7 +229,8 @@ DirectLight direct_in_medium(Medium medium, Flight flight, LightChoice choice, v
     float weight = direct_light_weight(direct.light.is_delta, direct.light.pdf, phase);
     if (HAS_EQUIANGULAR && !direct.light.is_infinite && weight > 0.0) {
         // All three ways share: 1/w = 1/w_direction + (density by angle / density by distance)².
-        float equiangular = direct_equiangular_ratio(flight, direct.light.target);
+        Equiangular e = direct_equiangular_of(flight, choice, direct.light.target);
+        float equiangular = equiangular_pdf(e, flight.distance) / flight.pdf;
         weight = 1.0 / (1.0 / weight + equiangular * equiangular);
     }
     bool is_lit = direct.light.pdf > 0.0 && weight * phase > 0.0;
@@ -238,7 +249,7 @@ DirectLight direct_along(Medium medium, Flight flight, LightChoice choice, vec4 
     if (direct.light.is_infinite) {
         return direct;
     }
-    Equiangular e = equiangular_of(flight.origin, flight.direction, flight.end, direct.light.target);
+    Equiangular e = direct_equiangular_of(flight, choice, direct.light.target);
     float distance = equiangular_sample(e, flight.end, u_distance);
     float pdf = equiangular_pdf(e, distance);
     direct.at = flight.origin + distance * flight.direction;

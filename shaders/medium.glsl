@@ -129,7 +129,25 @@ Equiangular equiangular_of(vec3 origin, vec3 d, float end, vec3 point)
     return e;
 }
 
-// Density, 1/m, of equiangular_sample at `distance`; 0 where it is not used.
+// Radians that arc tangent and arc cosine may be off together: 4096 ulp each, by Vulkan's bounds.
+const float EQUIANGULAR_MARGIN = 2.0e-3;
+
+// The same for a point that shines into a cone about `axis`, of at most 90°: drawn is where the segment is in it, or a
+// little more. In the plane of both the cosine to the axis is reach · cos(angle − peak).
+void equiangular_within(inout Equiangular e, vec3 origin, vec3 d, vec3 point, vec3 axis, float cos_cone)
+{
+    float x = dot(axis, e.closest * d - (point - origin)) / e.apart;
+    float y = dot(axis, d);
+    float reach = sqrt(x * x + y * y);
+    float peak = atan(y, x);
+    float half_width = acos(smaller(cos_cone / reach, 1.0)) + EQUIANGULAR_MARGIN;
+    // An interval that ends before it starts is empty.
+    half_width = reach > cos_cone - 1.0e-6 ? half_width : -PI;
+    e.angle_start = larger(e.angle_start, peak - half_width);
+    e.angle_end = smaller(e.angle_end, peak + half_width);
+}
+
+// Density, 1/m, of equiangular_sample at `distance`, which is where the point shines; 0 where it is not used.
 float equiangular_pdf(Equiangular e, float distance)
 {
     float angle = e.angle_end - e.angle_start;

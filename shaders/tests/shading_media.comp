@@ -8,7 +8,8 @@ layout(local_size_x = 64) in;
 
 const uint KIND_TRANSMITTANCE = 0u; // over the distance end
 const uint KIND_PHASE = 1u;         // value for d and wi = beta
-const uint KIND_EQUIANGULAR = 2u;   // density at the distance sigma_t.x; the point is at beta
+const uint KIND_EQUIANGULAR = 2u;   // density at the distance sigma_t.x; the point is at beta, and
+                                    // shines into the cone about sigma_s, of cosine g, where that is not 0
 const uint KIND_FLIGHT = 3u;        // draws: distance and weight
 const uint KIND_SCATTER = 4u;       // draws: direction and value
 const uint KIND_APPROACH = 5u;      // draws: distance and density, equiangular
@@ -52,6 +53,9 @@ vec4 answer(Case c, vec4 u)
         return vec4(wi, phase_value(m, c.d, wi));
     }
     Equiangular e = equiangular_of(vec3(0.0), c.d, c.end, c.beta);
+    if (c.sigma_s != vec3(0.0)) {
+        equiangular_within(e, vec3(0.0), c.d, c.beta, c.sigma_s, c.g);
+    }
     float distance = push.kind == KIND_EQUIANGULAR ? c.sigma_t.x : equiangular_sample(e, c.end, u.x);
     return vec4(distance, equiangular_pdf(e, distance), 0.0, 0.0);
 }

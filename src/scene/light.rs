@@ -11,7 +11,7 @@ pub enum LightKind {
     Spot {
         /// Cosine of the angle up to which the light is full.
         cos_inner: f32,
-        /// Cosine of the angle from which it is dark.
+        /// Cosine of the angle from which it is dark; not negative.
         cos_outer: f32,
     },
     /// Parallel light; `intensity` is the illuminance in lx on a surface that faces it.

@@ -312,6 +312,19 @@ pub const MUTANTS: &[Mutant] = &[
         killers: &["shading::media::approaches_to_a_light_have_their_density"],
     },
     Mutant {
+        name: "equiangular-cone",
+        wrong: "a spot's light along a segment is asked for in half of its cone",
+        file: "shaders/medium.glsl",
+        edits: &[(
+            "acos(smaller(cos_cone / reach, 1.0)) +",
+            "0.5 * acos(smaller(cos_cone / reach, 1.0)) +",
+        )],
+        killers: &[
+            "shading::media::approaches_to_a_spot_cover_its_cone",
+            "matter::fog::single_scattering_of_many_spots",
+        ],
+    },
+    Mutant {
         name: "segment-beam",
         wrong: "the tree of lights asks of a segment in a spot's cone for its ends alone",
         file: "shaders/light_tree.glsl",

@@ -1,5 +1,7 @@
 //! Media: Beer's law, distances of flight, and distances by the angle at a light.
 
+use std::f32::consts::FRAC_PI_2;
+
 use bytemuck::{Pod, Zeroable};
 use etendue::gpu::{BindingKind, Device};
 use etendue::scene::absorption_of;
@@ -297,6 +299,84 @@ fn approaches_to_a_light_have_their_density() {
     family.assert("approaches");
     // The distance from the light cancels: 1e-7 of 2 over 0.01.
     assert!(worst < 1e-4 && worst_sum < 1e-4);
+    drop(kernel);
+    finish(device);
+}
+
+/// Spots of all widths: distances are drawn in the cone alone, and everywhere in it.
+#[test]
+fn approaches_to_a_spot_cover_its_cone() {
+    const DRAWS: usize = 1 << 16;
+    const STEPS: usize = 1 << 18;
+    let Some(device) = open() else { return };
+    let kernel = kernel(&device);
+    let mut rng = Rng(7);
+    let mut cases = Vec::new();
+    for half_angle in [0.003_f32, 0.1, 0.7, FRAC_PI_2] {
+        for apart in [0.01_f32, 0.3, 5.0] {
+            for i in 0..6 {
+                let d = rng.unit();
+                let light = d * (3.0 * rng.uniform32()) + d.any_orthonormal_vector() * apart;
+                // Along the segment, at it, and anywhere.
+                let target = d * (3.0 * rng.uniform32());
+                let axis = match i {
+                    0 => d,
+                    1..=3 => (target - light).normalize(),
+                    _ => rng.unit(),
+                };
+                cases.push(Case {
+                    beta: light.to_array(),
+                    d: d.to_array(),
+                    end: 3.0,
+                    sigma_s: axis.to_array(),
+                    g: half_angle.cos().max(0.0),
+                    ..Case::zeroed()
+                });
+            }
+        }
+    }
+    let all = draw(&kernel, APPROACH, &cases, DRAWS, 16);
+    let (mut worst, mut lit, mut outside) = (0.0_f64, 0, 0.0_f64);
+    for (case, draws) in cases.iter().zip(all.chunks(DRAWS)) {
+        let [d, light, axis] = [case.d, case.beta, case.sigma_s].map(|v| Vec3::from(v).as_dvec3());
+        // Radians beyond the cone.
+        let beyond = |t: f64| {
+            let to = t * d - light;
+            axis.cross(to).length().atan2(axis.dot(to)) - f64::from(case.g).acos()
+        };
+        let step = f64::from(case.end) / STEPS as f64;
+        let wanted = (0..STEPS)
+            .filter(|&i| beyond((i as f64 + 0.5) * step) <= 0.0)
+            .count() as f64
+            * step;
+        // Every distance in the cone counts the inverse of its density, which makes its length.
+        let got = Estimate::of(draws.iter().map(|v| {
+            let is_in = v[1] > 0.0 && beyond(f64::from(v[0])) <= 0.0;
+            if is_in { 1.0 / f64::from(v[1]) } else { 0.0 }
+        }));
+        let off = (got.mean - wanted).abs();
+        // 1e-4: rounding of the cone's cosine where it is narrow, and of the distance from the light.
+        assert!(
+            off <= Z * got.error + 2.0 * step + 1e-4 * wanted,
+            "{case:?}: {} m instead of {wanted}, se {:.1e}",
+            got.mean,
+            got.error
+        );
+        if wanted > 0.0 {
+            lit += 1;
+            worst = worst.max(off / (got.error + step));
+            let farthest = draws
+                .iter()
+                .map(|v| beyond(f64::from(v[0])))
+                .fold(0.0, f64::max);
+            outside = outside.max(farthest);
+        }
+    }
+    println!(
+        "{lit} segments in cones: lengths off by {worst:.2} se at most, drawn up to {outside:.1e} beyond"
+    );
+    // Arc tangents of a device may be as far off as the margin for them.
+    assert!(lit >= 30 && outside <= 5e-3);
     drop(kernel);
     finish(device);
 }
